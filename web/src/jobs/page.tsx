@@ -1,5 +1,6 @@
 /** List of jobs, filtered, sorted and paged by the server; polled while the tab is visible. */
 
+import type { ComponentChildren } from 'preact'
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
 import { useNow, usePolling, useResource } from '../api/resource'
@@ -7,20 +8,26 @@ import type { JobFacets, JobState, JobSummary } from '../api/types'
 import { EmptyCard } from '../components/card'
 import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
+import { Check, Select } from '../components/fields/controls'
 import { Pager, Table } from '../components/table/table'
 import { formatCount } from '../format/number'
+import { capitalized } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
 import { jobColumns } from './columns'
-import { Filters, NO_FILTER } from './filters'
 import {
   descends,
+  FACETS,
+  type Facet,
+  FIRST_PAGE,
   isFiltered,
   type ListQuery,
   listQuery,
+  ORDERS,
   type Order,
   PAGE,
   reordered,
+  STATES,
 } from './list-query'
 import { jobsInWords, Selection } from './selection'
 import { useSparklines } from './sparkline'
@@ -180,4 +187,82 @@ function changeOfState(
   const changed = now.filter((j) => before.has(j.id) && before.get(j.id) !== j.state)
   if (changed.length === 0) return null
   return changed.map((job) => `${job.name || job.id} is ${job.state}`).join('; ')
+}
+
+const NO_FILTER: Readonly<Record<string, null>> = {
+  ...FIRST_PAGE,
+  search: null,
+  archived: null,
+  ...Object.fromEntries(FACETS.map((facet) => [facet, null])),
+}
+
+interface FiltersProps {
+  query: ListQuery
+  facets: JobFacets | null
+  children: ComponentChildren
+}
+
+function Filters({ query, facets, children }: FiltersProps) {
+  return (
+    <search class="row filters">
+      <label>
+        <span class="visually-hidden">Search by name, id, note or tag</span>
+        <input
+          type="search"
+          placeholder="Search by name, id, note or tag"
+          value={query.search ?? ''}
+          onInput={(event) =>
+            setQuery({ ...FIRST_PAGE, search: event.currentTarget.value || null })
+          }
+        />
+      </label>
+      {FACETS.map((facet) => (
+        <FacetFilter key={facet} facet={facet} query={query} facets={facets} />
+      ))}
+      <Select
+        hidden
+        label="Order"
+        value={query.order}
+        options={Object.entries(ORDERS) as [Order, string][]}
+        onChoose={(order) => setQuery({ ...FIRST_PAGE, order, reverse: null })}
+      />
+      <Check
+        label="archived"
+        checked={query.archived}
+        onChange={(on) => setQuery({ ...FIRST_PAGE, archived: on ? '' : null })}
+      />
+      <span class="muted small" aria-live="polite">
+        {children}
+      </span>
+    </search>
+  )
+}
+
+interface FacetFilterProps {
+  facet: Facet
+  query: ListQuery
+  facets: JobFacets | null
+}
+
+function FacetFilter({ facet, query, facets }: FacetFilterProps) {
+  const selected = query[facet]
+  const counts: Readonly<Record<string, number>> = facets?.[`${facet}s`] ?? {}
+  const names: string[] =
+    facet === 'state' ? STATES.filter((s) => s in counts) : Object.keys(counts).sort()
+  if (selected !== undefined && !names.includes(selected)) names.push(selected)
+  // A single option cannot filter.
+  if (selected === undefined && names.length < 2 && facet !== 'state') return null
+  const total = facet === 'state' && facets ? ` (${formatCount(facets.total)})` : ''
+  return (
+    <Select
+      hidden
+      label={capitalized(facet)}
+      value={selected ?? ''}
+      options={[
+        ['', `all ${facet}s${total}`],
+        ...names.map((name) => [name, `${name} (${formatCount(counts[name] ?? 0)})`] as const),
+      ]}
+      onChoose={(name) => setQuery({ ...FIRST_PAGE, [facet]: name || null })}
+    />
+  )
 }

@@ -1,10 +1,12 @@
 /** Name, state, figures and commands of a job. */
 
+import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { isReadable } from '../../api/jobs'
-import { useNow, useResource } from '../../api/resource'
+import { useNow, useResource, useSlowly } from '../../api/resource'
 import type { Job, JobSummary, StoredJob, TuningWorlds } from '../../api/types'
 import { Progress, StateBadge } from '../../components/state'
+import { useVisible } from '../../components/use-visible'
 import {
   change,
   formatCount,
@@ -14,14 +16,15 @@ import {
   quantity,
 } from '../../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../../format/time'
-import { jobPath } from '../../router/routes'
+import { lazyPage } from '../../router/lazy-page'
+import { jobPath, withQuery } from '../../router/routes'
 import { budgetSpent, caseWords, fitnessUnit, startDesigns } from '../facts'
 import type { Gain } from '../gain'
 import type { LiveJob } from '../live/use-job'
 import { JobActions } from './actions'
 import { EndNotice } from './end-notice'
-import { WalkPreview } from './walk-preview'
 import './header.css'
+import '../../walk/player/walk-stage.css'
 
 export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; gain: Gain }) {
   const { followed } = live
@@ -251,4 +254,37 @@ function changedWords({ changed }: Lineage): string {
 
 function forkWords({ lineage }: JobSummary): string {
   return lineage ? `from iteration ${lineage.from_iteration}${changedWords(lineage)}` : ''
+}
+
+const BestWalk = lazyPage('the walk', () => import('./best-walk'))
+
+const REST_MS = 1200
+const RENEW_MS = 30_000
+
+function WalkPreview({ job }: { job: Job }) {
+  const box = useRef<HTMLDivElement>(null)
+  const visible = useVisible(box)
+  const [active, setActive] = useState(false)
+  const best = useSlowly(job.best_iteration ?? 0, RENEW_MS)
+  useEffect(() => {
+    if (active || !visible || matchMedia('(prefers-reduced-motion: reduce)').matches) return
+    const timer = setTimeout(() => setActive(true), REST_MS)
+    return () => clearTimeout(timer)
+  }, [visible, active])
+  return (
+    <div class="walk-preview" ref={box} data-loaded={active}>
+      {active ? (
+        <BestWalk job={job} best={best} visible={visible} />
+      ) : (
+        <div class="walk-preview-stage">
+          <button type="button" onClick={() => setActive(true)}>
+            Show the replay
+          </button>
+        </div>
+      )}
+      <a class="small" href={withQuery('/walk', { job: job.id })}>
+        Full replay with plots
+      </a>
+    </div>
+  )
 }

@@ -1,15 +1,25 @@
 /** Overview of a job: convergence, distribution, diversity, winner and limiting factors. */
 
+import type { Job, JobSpec, Preference } from '../../api/types'
+import { ChartCard } from '../../charts/chart-card'
 import { EmptyCard } from '../../components/card'
 import { ErrorNotice } from '../../components/feedback'
-import { formatNumber, percent } from '../../format/number'
+import { Table } from '../../components/table/table'
+import { BrokenName } from '../../components/text'
+import { formatExact, formatNumber, NONE, percent, quantity } from '../../format/number'
+import { placeWord } from '../../format/place'
+import { exactValueQuantity } from '../../format/value'
+import { inWords } from '../../format/words'
+import { withQuery } from '../../router/routes'
 import { IterationChart } from '../by-iteration'
+import { VARIABLE } from '../columns'
+import { searchedVariables } from '../facts'
 import type { PanelProps } from '../page'
+import { type Analysis, analyse, type Factor } from '../preference'
 import { ConvergenceChart } from './convergence-chart'
 import { DistributionChart } from './distribution-chart'
-import { LimitsCard } from './limits-card'
+import { type WinnerVariable, winnerVariables } from './model'
 import { useDistribution } from './use-distribution'
-import { WinnerCard } from './winner-card'
 import './overview.css'
 
 export function OverviewPanel({ live, job, gain: { reference } }: PanelProps) {
@@ -67,5 +77,219 @@ export function OverviewPanel({ live, job, gain: { reference } }: PanelProps) {
         </>
       )}
     </div>
+  )
+}
+
+function WinnerCard({ job }: { job: Job }) {
+  const best = job.best!
+  const rows = winnerVariables(best.design, searchedVariables(job.spec))
+  const atBound = rows.filter(({ at }) => at !== null)
+  const place = { job: job.id, iteration: best.iteration, particle: best.particle }
+  return (
+    <ChartCard
+      title="Winner"
+      note={`Design ${placeWord(best)}. Bars show the search ranges.${
+        atBound.length > 0 ? ` At a bound: ${atBound.map(({ name }) => name).join(', ')}.` : ''
+      }`}
+      tools={
+        job.kind === 'tuning' && (
+          <>
+            <a class="button compact" href={withQuery('/walk', place)}>
+              Show replay
+            </a>
+            <a class="button compact" href={withQuery('/controller', place)}>
+              Show controller
+            </a>
+          </>
+        )
+      }
+      table={() => (
+        <Table<WinnerVariable>
+          caption="Winner and search bounds"
+          rows={rows}
+          pageSize={60}
+          columns={[
+            VARIABLE,
+            {
+              key: 'value',
+              numeric: true,
+              value: ({ value }) => value,
+              cell: ({ value, unit }) => exactValueQuantity(value, unit),
+            },
+            {
+              key: 'from',
+              numeric: true,
+              value: ({ low }) => low,
+              cell: ({ low }) => formatExact(low),
+            },
+            {
+              key: 'to',
+              numeric: true,
+              value: ({ high }) => high,
+              cell: ({ high }) => formatExact(high),
+            },
+            { key: 'position in range', percent: 3, value: ({ share }) => share },
+            { key: 'bound', value: ({ at, fixed }) => (fixed ? 'fixed' : (at ?? NONE)) },
+          ]}
+        />
+      )}
+    >
+      <dl class="design" data-active-bounds={atBound.map(({ name }) => name).join(' ')}>
+        {rows.map((row) => (
+          <div key={row.name}>
+            <dt>
+              <BrokenName name={row.name} />
+            </dt>
+            <dd>{exactValueQuantity(row.value, row.unit)}</dd>
+            <dd class="in-bounds">
+              {row.share === null ? (
+                <span class="muted small">{row.fixed ? 'fixed' : 'categorical'}</span>
+              ) : (
+                <RangeBar row={row} />
+              )}
+            </dd>
+          </div>
+        ))}
+      </dl>
+    </ChartCard>
+  )
+}
+
+function RangeBar({ row }: { row: WinnerVariable }) {
+  return (
+    <>
+      <div
+        class="range-bar"
+        role="img"
+        aria-label={positionInWords(row)}
+        data-at={row.at ?? undefined}
+      >
+        <i style={{ width: `${100 * row.share!}%` }} />
+        <b style={{ left: `${100 * row.share!}%` }} />
+      </div>
+      <span class="range-ends muted small" aria-hidden="true">
+        <span>{formatExact(row.low, 4)}</span>
+        {row.at !== null && <strong>at bound</strong>}
+        <span>{formatExact(row.high, 4)}</span>
+      </span>
+    </>
+  )
+}
+
+function positionInWords({ low, high, share, at }: WinnerVariable): string {
+  const range = `of the range from ${formatExact(low)} to ${formatExact(high)}`
+  return `at ${percent(share, 3)} ${range}${at === null ? '' : `, at the ${at === 'low' ? 'lower' : 'upper'} bound`}`
+}
+
+function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
+  // A stored spec has its presets resolved.
+  const analysis = job.best && analyse(job.best.scenarios, spec.preference as Preference)
+  if (!analysis) return null
+  const units = new Map(job.objectives.map((o) => [o.name, o.unit]))
+  return (
+    <ChartCard
+      title="Limiting factors"
+      table={() => (
+        <Table<Factor>
+          caption="Limiting factors"
+          rows={analysis.factors}
+          order={{ column: 'sensitivity', descending: true }}
+          columns={[
+            { key: 'scenario', header: true, value: (f) => f.scenario },
+            { key: 'objective', value: (f) => inWords(f.objective) },
+            { key: 'value', digits: 4, value: (f) => f.value },
+            { key: 'unit', value: (f) => units.get(f.objective) ?? '1' },
+            {
+              key: 'contribution to log utility',
+              digits: 3,
+              value: (f) => f.contribution,
+            },
+            {
+              key: 'sensitivity',
+              label: 'Sensitivity of the fitness',
+              digits: 3,
+              value: (f) => f.sensitivity,
+            },
+          ]}
+        />
+      )}
+    >
+      <div class="stack">
+        <p data-limit={`${analysis.worstScenario} ${analysis.worstFactor.objective}`}>
+          {explain(analysis, units)}
+        </p>
+        {Object.keys(analysis.utilities).length > 1 && <ContributionTable analysis={analysis} />}
+      </div>
+    </ChartCard>
+  )
+}
+
+function explain(
+  { worstScenario, worstFactor, excess, factors, utilities }: Analysis,
+  units: Map<string, string>,
+) {
+  const steepest = factors.reduce((a, b) => (b.sensitivity > a.sensitivity ? b : a))
+  const value = quantity(worstFactor.value, units.get(worstFactor.objective) ?? '1')
+  const gain = 1 - (1 - 0.1) ** steepest.sensitivity
+  const several = Object.keys(utilities).length > 1
+  return (
+    <>
+      {several && (
+        <>
+          Scenario <strong>{worstScenario}</strong> limits the winner most: its utility is{' '}
+          {formatNumber(excess, 3)} times the geometric mean of all scenarios, mainly because of{' '}
+          <strong>{inWords(worstFactor.objective)}</strong> ({value}).{' '}
+        </>
+      )}
+      The most effective improvement is in {inWords(steepest.objective)} of {steepest.scenario}:
+      reducing it by 10&nbsp;% lowers the fitness by about {percent(gain, 2)}.
+    </>
+  )
+}
+
+/** Contribution of each objective to a scenario's utility relative to the mean; rows add up. */
+function ContributionTable({ analysis: { factors, utilities } }: { analysis: Analysis }) {
+  const objectives = [...new Set(factors.map((f) => f.objective))]
+  const most = Math.max(...factors.map((f) => Math.abs(f.contribution)))
+  const contribution = (scenario: string, objective: string) =>
+    factors.find((f) => f.scenario === scenario && f.objective === objective)?.contribution ?? null
+  return (
+    <div>
+      <Table<string>
+        caption="Contributions of the objectives to the logarithm of a scenario’s relative utility"
+        rows={Object.keys(utilities)}
+        order={{ column: 'sum', descending: true }}
+        columns={[
+          { key: 'scenario', header: true, value: (s) => s },
+          ...objectives.map((objective) => ({
+            key: objective,
+            label: inWords(objective),
+            numeric: true,
+            value: (s: string) => contribution(s, objective),
+            cell: (s: string) => <Share value={contribution(s, objective)} most={most} />,
+          })),
+          {
+            key: 'sum',
+            numeric: true,
+            value: (s) => utilities[s],
+            cell: (s) => <strong>{formatNumber(utilities[s], 3)}</strong>,
+          },
+        ]}
+      />
+      <p class="muted small table-note">
+        Each number is e ln((b + f) / geometric mean of b + f over the scenarios). A sum is the
+        logarithm of the scenario’s utility over the geometric mean of all.
+      </p>
+    </div>
+  )
+}
+
+function Share({ value, most }: { value: number | null; most: number }) {
+  if (value === null) return <>{NONE}</>
+  return (
+    <span class="share" data-negative={value < 0}>
+      <i style={{ width: `${(Math.abs(value) / most) * 100}%` }} aria-hidden="true" />
+      <span>{formatNumber(value, 3)}</span>
+    </span>
   )
 }

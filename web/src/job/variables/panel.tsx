@@ -15,19 +15,30 @@ import {
 import { Card, EmptyCard, Loaded } from '../../components/card'
 import { Empty } from '../../components/feedback'
 import { Check } from '../../components/fields/controls'
+import { type Column, Table } from '../../components/table/table'
 import { formatCount } from '../../format/number'
 import { type Place, placeOf, placeWord } from '../../format/place'
-import { type Codec, flag, ignore, useDelayedQuery, useQueryValue } from '../../router/query-value'
+import { formatValue, named } from '../../format/value'
+import { inWords } from '../../format/words'
+import {
+  type Codec,
+  flag,
+  ignore,
+  PAGE_NUMBER,
+  useDelayedQuery,
+  useQueryValue,
+} from '../../router/query-value'
+import { DesignLink } from '../columns'
 import {
   axesOf,
   brushesOf,
   brushWords,
   columnNamed,
   decodeParticles,
+  type ParticleColumn,
   type Particles,
   particlesTable,
 } from '../designs/particles'
-import { SelectedDesigns } from '../designs/selected-designs'
 import { caseWords } from '../facts'
 import { BrushFields } from './brush-fields'
 import { PairCard } from './pair-card'
@@ -193,4 +204,56 @@ function rowOf(particles: Particles, place: Place | null): number | null {
     (iteration, k) => iteration === place.iteration && numbers[k] === place.particle,
   )
   return row < 0 ? null : row
+}
+
+const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
+
+interface SelectedDesignsProps {
+  job: Job
+  particles: Particles
+  rows: readonly number[]
+  marked?: number | null
+}
+
+function SelectedDesigns({ job, particles, rows, marked = null }: SelectedDesignsProps) {
+  const iteration = columnNamed(particles, 'iteration')!.values
+  const particle = columnNamed(particles, 'particle')!.values
+  const numbers = particles.columns.filter(({ kind }) => kind !== 'index')
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
+  return (
+    <Table
+      caption="Designs"
+      rows={rows}
+      rowKey={(row) => `${iteration[row]} ${particle[row]}`}
+      paging={paging}
+      order={{ column: 'fitness', descending: false }}
+      rowData={(row) => ({ 'data-marked': String(row === marked) })}
+      columns={[
+        {
+          key: 'design',
+          header: true,
+          value: (row) => iteration[row] * 1e5 + particle[row],
+          cell: (row) => (
+            <DesignLink job={job} iteration={iteration[row]} particle={particle[row]} />
+          ),
+        },
+        ...numbers.map(
+          (column): Column<number> => ({
+            key: column.name,
+            label: labelOf(column, job),
+            unit: column.unit,
+            numeric: column.kind !== 'categorical',
+            value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),
+            cell: (row) =>
+              formatValue(named(column.values[row], column.choices), DIGITS[column.kind] ?? 5),
+          }),
+        ),
+      ]}
+    />
+  )
+}
+
+function labelOf({ name, kind }: ParticleColumn, job: Job): string {
+  if (kind === 'utility') return name.replace(/^utility:/, `${caseWords(job.kind).measure} `)
+  return kind === 'objective' ? inWords(name.replace(/^objective:/, '')) : name
 }

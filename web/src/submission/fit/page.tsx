@@ -2,9 +2,12 @@
 
 import { useMemo, useState } from 'preact/hooks'
 import { get, post } from '../../api/client'
-import { useResource } from '../../api/resource'
-import type { RobotPreset, RobotSource } from '../../api/types'
-import { Loaded } from '../../components/card'
+import { type Resource, useResource } from '../../api/resource'
+import type { RecordingView, RobotPreset, RobotSource } from '../../api/types'
+import { Card, Loaded } from '../../components/card'
+import { Combobox } from '../../components/fields/combobox'
+import { RemovableList } from '../../components/fields/removable-list'
+import { formatNumber } from '../../format/number'
 import { ALL_JOBS, Breadcrumbs } from '../../router/breadcrumbs'
 import { setQuery } from '../../router/navigation'
 import { idsOf } from '../../router/query-value'
@@ -15,7 +18,7 @@ import { emptyDraft, type RobotDraft } from '../draft/draft'
 import { RobotSection } from '../robot/section'
 import { CalibrationForm } from './calibration'
 import { IdentificationForm } from './identification'
-import { RecordingsCard } from './recordings/recordings-card'
+import { idsIn, recordingSearch, shortId } from './recordings/recording-search'
 import { UploadCard } from './recordings/upload-card'
 
 export type FitKind = 'identification' | 'calibration'
@@ -149,4 +152,45 @@ function useFittableParameters(robot: RobotDraft, { robots }: Catalogue): Fittab
   const shipped = robots.find(({ name }) => name === robot.name) ?? robots[0]
   if (robot.kind !== 'files') return shipped
   return { parameters: checked.data?.parameters ?? [], conventions: shipped.conventions }
+}
+
+interface RecordingsCardProps {
+  ids: readonly string[]
+  recordings: Resource<readonly RecordingView[]>
+  onChange: (ids: readonly string[]) => void
+}
+
+function RecordingsCard({ ids, recordings, onChange }: RecordingsCardProps) {
+  return (
+    <Card class="stack" title="Recordings to fit">
+      {ids.length === 0 && (
+        <p class="muted">None yet: upload a log above, or select a stored recording.</p>
+      )}
+      <Loaded resource={recordings} what="the recordings" />
+      <RemovableList ids={ids} short={shortId} onChange={onChange}>
+        {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
+      </RemovableList>
+      <div class="fields">
+        <Combobox
+          label="Stored recordings"
+          placeholder="scenario, controller or id"
+          remote={{ label: 'Recordings, newest first', search: recordingSearch(ids) }}
+          hint="You can paste several ids at once."
+          onChoose={(id) => onChange([...ids, id])}
+          onPaste={(text) => {
+            const pasted = idsIn(text).filter((id) => !ids.includes(id))
+            if (pasted.length > 0) onChange([...ids, ...pasted])
+            return pasted.length > 0
+          }}
+        />
+      </div>
+    </Card>
+  )
+}
+
+function inWords(recording: RecordingView | undefined): string {
+  if (!recording) return ''
+  const { scenario, controller, seconds, mean_current, synthetic } = recording
+  const length = `${formatNumber(seconds, 3)} s of ${scenario} with ${controller}`
+  return `${length}, ${formatNumber(mean_current, 3)} A${synthetic ? ', synthetic' : ''}`
 }

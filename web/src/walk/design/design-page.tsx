@@ -1,8 +1,12 @@
 /** Common parts of the walk and controller pages, whose address identifies a design. */
 
 import type { ComponentChildren } from 'preact'
+import { useState } from 'preact/hooks'
+import { get } from '../../api/client'
+import { usePolling } from '../../api/resource'
+import type { StoredJob } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
-import { useProgress } from '../../job/live/use-progress'
+import { isActive, progressInWords } from '../../job/facts'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../../router/breadcrumbs'
 import { usePlace } from '../../router/navigation'
 import { jobPath, withQuery } from '../../router/routes'
@@ -96,4 +100,17 @@ export function DesignLinks({ source, path, label }: DesignLinksProps) {
       )}
     </div>
   )
+}
+
+const RENEW_MS = 4000
+
+function useProgress(initial: StoredJob | undefined): string | null {
+  const [renewed, setRenewed] = useState(initial)
+  const job = renewed?.id === initial?.id ? renewed : initial
+  const active = job !== undefined && isActive(job)
+  const renew = (id: string) =>
+    // Keep the previous state until a response arrives.
+    get('/v1/jobs/{job_id}', { path: { job_id: id } }).then(setRenewed, () => undefined)
+  usePolling(() => active && renew(job.id), RENEW_MS, active)
+  return active ? progressInWords(job) : null
 }

@@ -55,6 +55,8 @@ def with_nodes(host: Process, runner: Process, count: int) -> list[str]:
     """Ids of so many nodes with a CPU each."""
     while len(host.run(cluster_host.nodes)) < count:
         host.run(cluster_host.add)
+    for surplus in host.run(cluster_host.nodes)[count:]:
+        host.run(cluster_host.lose, surplus)
     runner.run(cluster_runner.wait_for_slots, count)
     return host.run(cluster_host.nodes)
 

@@ -116,7 +116,7 @@ def test_a_job_on_three_nodes_of_which_one_is_lost_every_few_seconds_has_the_sam
     host: Process, runner: Process, store: Store, database: Path
 ) -> None:
     with_nodes(host, runner, 3)
-    spec = JobSpec.model_validate(LONG_SPEC | {"iterations": 8})
+    spec = JobSpec.model_validate(LONG_SPEC | {"iterations": 24})
     there, here = (store.create_job(spec)[0].id for _ in range(2))
     done, lost = threading.Event(), 0
     ended = runner.begin(cluster_runner.run_job, str(database), there)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
 import socket
 import subprocess
@@ -63,6 +64,7 @@ class Deployment:
     disk: Disk | None = field(init=False, default=None)
     network: Network | None = field(init=False, default=None)
     clock: Clock | None = field(init=False, default=None)
+    _ray_token: str = field(init=False, default_factory=lambda: secrets.token_hex(32))
     _stack: ExitStack = field(init=False, default_factory=ExitStack)
 
     def __enter__(self) -> Self:
@@ -194,6 +196,8 @@ class Deployment:
         outside = {k: v for k, v in os.environ.items() if not k.startswith(("GAITSWARM_", "RAY_"))}
         environment = outside | {f"GAITSWARM_{key}": value for key, value in settings.items()}
         environment["PYTHONPATH"] = str(ROOT)
+        if self.with_ray:
+            environment |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": self._ray_token}
         if self.clock is not None and with_clock:
             environment |= self.clock.variables
         limits = None

@@ -182,7 +182,7 @@ class AccessMiddleware:
         try:
             response = await self._refusal(scope, path)
         except StoreUnavailable as error:
-            _log.error("%s: %s", scope["path"], error)
+            _log.error("%r: %s", scope["path"], error)
             response = problem(scope["path"], "unavailable", error.for_clients)
         await (response or self.app)(scope, receive, send)
 

@@ -95,7 +95,7 @@ def _components(service: JobService, request: Request) -> Iterator[ComponentView
     try:
         service.store.ping()
     except StoreUnavailable as error:
-        _log.error("%s: %s", request.url.path, error)
+        _log.error("%r: %s", request.url.path, error)
         yield ComponentView(name="database", status="failed", detail=error.for_clients)
     else:
         yield ComponentView(name="database", status="ok")

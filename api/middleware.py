@@ -68,7 +68,7 @@ class RequestIdMiddleware:
             try:
                 await self.app(scope, receive, send_with_id)
             except Exception as error:
-                what = f"{scope['method']} {scope['path']} (request {request_id})"
+                what = f"{scope['method']} {scope['path']!r} (request {request_id})"
                 # Starlette wraps errors that are raised after the response has started.
                 cause = error if isinstance(error, GaitswarmError) else error.__cause__
                 if started and isinstance(cause, GaitswarmError):

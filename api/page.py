@@ -78,19 +78,28 @@ def add_page(app: FastAPI, folder: Path) -> None:
         return HTMLResponse(text, headers=_NO_CACHE)
 
     def asset(request: Request) -> Response:
-        name = request.path_params["name"]
-        path = folder / "assets" / name
-        # The router passes no slash in a name; `..` remains.
-        if name.startswith(".") or not path.is_file():
+        path = _file(folder / "assets", request.path_params["name"])
+        if path is None or path.name.startswith("."):
             detail = "the page has no such asset; reload the page, it has been rebuilt"
             return problem(request.url.path, "not-found", detail)
-        media_type = _MEDIA_TYPES.get(path.suffix) or mimetypes.guess_type(name)[0]
+        media_type = _MEDIA_TYPES.get(path.suffix) or mimetypes.guess_type(path.name)[0]
         headers = {"Cache-Control": "public, max-age=31536000, immutable"}
         return FileResponse(path, headers=headers, media_type=media_type)
 
     for path in ("/", *PAGES, *(f"{view}/{{rest:path}}" for view in PAGES)):
         app.add_route(path, page, include_in_schema=False)
     app.add_route("/assets/{name}", asset, include_in_schema=False)
+
+
+def _file(folder: Path, name: str) -> Path | None:
+    """Return a file in a folder or below it; None if there is none of that name."""
+    root = folder.resolve()
+    try:
+        path = (root / name).resolve()
+        return path if path.is_relative_to(root) and path.is_file() else None
+    except (OSError, ValueError):
+        # A name that no file can have, too long or with a null byte.
+        return None
 
 
 def _without_page(request: Request) -> str | None:
@@ -116,9 +125,8 @@ def add_manual(app: FastAPI, folder: Path) -> None:
     def page(request: Request) -> Response:
         if not _has_manual(folder):
             return _no_manual(request)
-        root = folder.resolve()
-        path = (root / request.path_params["path"]).resolve()
-        if not (path.is_relative_to(root) and path.is_file()):
+        path = _file(folder, request.path_params["path"])
+        if path is None:
             detail = "the manual has no such page; begin at /manual"
             return problem(request.url.path, "not-found", detail)
         if path.suffix != ".html":

@@ -160,7 +160,7 @@ def unavailable(
     errors: Sequence[FieldErrorView] = (),
 ) -> Response:
     """Return a 503 with the time after which to retry, and log it."""
-    _log.error("%s: %s", request_path, detail)
+    _log.error("%r: %s", request_path, detail)
     return problem(request_path, kind, detail, errors=errors, headers=_RETRY)
 
 
@@ -211,7 +211,7 @@ async def domain_problem(request: Request, error: Exception) -> Response:
     elif isinstance(error, SimulationInputError):
         errors = [_short(FieldErrorView.from_message("", detail))]
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
-        _log.error("%s %s: %s", request.method, request.url.path, error)
+        _log.error("%s %r: %s", request.method, request.url.path, error)
         return problem(request.url.path, name, detail, headers=_RETRY)
     if status == HTTPStatus.UNAUTHORIZED:
         return unauthorized(request.url.path, detail)

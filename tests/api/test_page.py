@@ -13,6 +13,7 @@ import httpx2
 import pytest
 
 from gaitswarm.api.page import is_built
+from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job
 from tests.api.conftest import Commit, Serve
 from tests.examples.processes import python
@@ -65,13 +66,33 @@ def test_other_paths_stay_problems(page: httpx2.Client, path: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["index-Gone.js", ".hidden", "..%2fsecret.txt", "%2e%2e/secret.txt", "%2e%2e%2fsecret.txt", ""],
+    [
+        *("index-Gone.js", ".hidden", "", "..%2fsecret.txt", "%2e%2e/secret.txt"),
+        *("%2e%2e%2fsecret.txt", "a" * 256 + "%0aERROR%1b[2J", "%00"),
+    ],
 )
 def test_what_is_no_asset_is_a_problem(page: httpx2.Client, name: str) -> None:
     answer = page.get(f"/assets/{name}")
 
     assert answer.status_code == 404
     assert answer.json()["type"] == "urn:gaitswarm:problem:not-found"
+
+
+@pytest.mark.parametrize("error", [RuntimeError("a bug"), StoreUnavailable("away")])
+def test_a_path_forges_no_log_lines(
+    page: httpx2.Client,
+    error: Exception,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("gaitswarm.api.page._file", fail)
+    page.get("/assets/x%0aERROR%1b[2J")
+
+    (record,) = caplog.records
+    assert "/assets/x" in record.getMessage() and record.getMessage().isprintable()
 
 
 def test_assets_are_compressed_and_kept_for_good(page: httpx2.Client) -> None:

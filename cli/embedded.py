@@ -12,7 +12,7 @@ from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import note, show
 from gaitswarm.cli.progress import show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, worth
-from gaitswarm.designs import SimulationRequest, run_simulation
+from gaitswarm.designs import SimulationRequest
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
@@ -31,6 +31,7 @@ from gaitswarm.services.runtime import (
 )
 from gaitswarm.settings import read_settings
 from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.simulation import run_simulation
 
 if TYPE_CHECKING:
     from gaitswarm.cli.inputs.options import WorkerOptions
@@ -44,8 +45,8 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
     from gaitswarm.services.optimizer.store import Store
     from gaitswarm.settings import Settings
+    from gaitswarm.simulation import SimulationView
     from gaitswarm.views.job import JobView
-    from gaitswarm.views.simulation import SimulationView
 
 
 def resumed_job(

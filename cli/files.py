@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.views.simulation import WalkLogView
+    from gaitswarm.simulation import WalkLogView
 
 
 @contextmanager

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.sim.outcome import Objective
     from gaitswarm.sim.variables import Variable
+    from gaitswarm.simulation import PlannedGaitView, SimulationView
     from gaitswarm.views.history import BestView
     from gaitswarm.views.job import JobSummaryView, JobView, Spent
-    from gaitswarm.views.simulation import PlannedGaitView, SimulationView
 
 MISSING: Final = "–"
 

@@ -47,9 +47,13 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
     from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
-    from gaitswarm.preferences import robust_preferences
     from gaitswarm.replay import WalkReplay
-    from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
+    from gaitswarm.robustness_index import (
+        RobustnessOptions,
+        RobustnessView,
+        robust_preferences,
+        robustness,
+    )
     from gaitswarm.services.optimizer.analysis.certificate import CertificateView
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
@@ -87,8 +91,7 @@ if TYPE_CHECKING:
     from gaitswarm.sim.robot import RobotFiles, RobotVariant
     from gaitswarm.sim.scenario import PRESETS, SCENARIOS, Scenario
     from gaitswarm.sim.variables import Variable
-    from gaitswarm.simulation import robustness, simulate
-    from gaitswarm.simulation_result import ScenarioResult, SimulationResult
+    from gaitswarm.simulation import ScenarioResult, SimulationResult, simulate
     from gaitswarm.specs import SpecOptions, job_spec
     from gaitswarm.surface import SurfaceView
     from gaitswarm.tables import EvaluationTable, Table
@@ -134,9 +137,7 @@ _MODULES: Final = {
     "gaitswarm.jobs.open": ("connect", "connect_async", "open", "open_async"),
     "gaitswarm.jobs.server": ("ServerJobs",),
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
-    "gaitswarm.preferences": ("robust_preferences",),
-    "gaitswarm.simulation": ("robustness", "simulate"),
-    "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
+    "gaitswarm.simulation": ("ScenarioResult", "SimulationResult", "simulate"),
     "gaitswarm.specs": ("SpecOptions", "job_spec"),
     "gaitswarm.tables": ("EvaluationTable", "Table"),
     "gaitswarm.services.optimizer.analysis.evaluations": ("EvaluationView",),
@@ -155,7 +156,9 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.analysis.comparison": ("JobComparisonView",),
     "gaitswarm.services.optimizer.analysis.identifiability": ("IdentifiabilityView",),
     "gaitswarm.replay": ("WalkReplay",),
-    "gaitswarm.robustness_index": ("RobustnessOptions", "RobustnessView"),
+    "gaitswarm.robustness_index": (
+        "RobustnessOptions", "RobustnessView", "robust_preferences", "robustness",
+    ),
     "gaitswarm.surface": ("SurfaceView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),

@@ -1,4 +1,4 @@
-"""Single designs in requests, and their simulation."""
+"""Single designs in requests."""
 
 from __future__ import annotations
 
@@ -14,19 +14,17 @@ from gaitswarm.robots import DEFAULT_CONTROLLER, DEFAULT_PREFERENCE
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Request
-from gaitswarm.sim.assembly import check_precision
+from gaitswarm.sim.assembly import Backend, check_precision
 from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait.stability import static_stability
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from gaitswarm.sim.simulate import Simulation, check_drives, check_reach, simulate
 from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.sim.worlds import WorldWalk, check_worlds
-from gaitswarm.views.simulation import SimulationView
+from gaitswarm.sim.worlds import MeasuredPerturbedWalk, check_worlds
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 
@@ -138,35 +136,47 @@ class WorldRequest(DesignRequest):
     @model_validator(mode="after")
     def _world_can_be(self) -> Self:
         try:
-            check_worlds(tuple(self.world), self._worlds)
+            check_worlds(tuple(self.world), np.array([tuple(self.world.values())], np.float64))
         except SimulationInputError as error:
             raise ValueError(f"world.{error}") from error
         return self
 
-    @property
-    def _worlds(self) -> NDArray[np.float64]:
-        return np.array([tuple(self.world.values())], dtype=np.float64)
+    def perturbed_walk(
+        self, scenario: Scenario, precision: Precision = "double"
+    ) -> MeasuredPerturbedWalk:
+        """The simulation of designs with these variables in the world."""
+        return MeasuredPerturbedWalk(
+            scenario.name,
+            self.robot,
+            self.controller,
+            scenario,
+            tuple(self.world.items()),
+            tuple(self.design),
+            precision,
+        )
 
     def walk(
         self,
         scenario: Scenario,
+        designs: NDArray[np.float64] | None = None,
         *,
         log: bool,
         precision: Precision = "double",
+        backend: Backend = "auto",
     ) -> Simulation:
-        """Simulate the design in a scenario of its world."""
-        names, values = tuple(self.design), tuple(self.numbers.values())
+        """Simulate the design, or others of the same variables, in a scenario of its world."""
+        if designs is None:
+            designs = np.array([tuple(self.numbers.values())], dtype=np.float64)
         if self.world:
-            design, known = tuple(self.numbers.items()), tuple(self.world)
-            case = WorldWalk(self.robot, self.controller, design, scenario, known, precision)
-            return case.simulate(self._worlds, log=log)
+            return self.perturbed_walk(scenario, precision).simulate(designs, log=log)
         return simulate(
             scenario,
             self.controller,
-            names,
-            np.array([values], dtype=np.float64),
+            tuple(self.design),
+            designs,
             robot=self.robot,
             log=log,
+            backend=backend,
             precision=precision,
         )
 
@@ -207,29 +217,3 @@ class SimulationRequest(WalksRequest, WorldRequest):
     def resolved_preference(self) -> Preference:
         """The preference in full."""
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
-
-
-def run_simulation(request: SimulationRequest) -> SimulationView:
-    """Simulate the design in every scenario."""
-    request.check_walks()
-    scenarios = request.resolved_scenarios()
-    walks = [
-        request.walk(scenario, log=request.log, precision=request.precision)
-        for scenario in scenarios
-    ]
-    return SimulationView.from_walks(
-        robot=request.robot,
-        controller=request.controller,
-        design=request.numbers,
-        preference=request.resolved_preference(),
-        precision=request.precision,
-        names=[scenario.name for scenario in scenarios],
-        statuses=np.concatenate([walk.outcome.statuses for walk in walks]),
-        objectives=np.concatenate([walk.outcome.objectives for walk in walks]),
-        measurements=np.concatenate([walk.measurements.array() for walk in walks]),
-        logs=[log for walk in walks for log in walk.logs],
-        gaits=[
-            static_stability(load_robot(request.robot), request.walked(scenario))
-            for scenario in scenarios
-        ],
-    )

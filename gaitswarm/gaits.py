@@ -15,7 +15,7 @@ from gaitswarm.sim.gait.gaits import GAITS, find_gait, leg_gaits, suits, support
 from gaitswarm.sim.gait.stability import static_stability
 from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
 from gaitswarm.sim.scenario import GaitName, Scenario
-from gaitswarm.views.simulation import PlannedGaitView
+from gaitswarm.simulation import PlannedGaitView
 
 COLUMNS: Final = 40
 """Moments of a cycle that a diagram shows."""

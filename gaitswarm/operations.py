@@ -30,7 +30,7 @@ from typing import (
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from gaitswarm.designs import SimulationRequest, resolved, run_simulation
+from gaitswarm.designs import SimulationRequest, resolved
 from gaitswarm.firmware import (
     FirmwareRequest,
     FirmwareView,
@@ -90,6 +90,7 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.firmware import parsed_table_bits
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.robot import RobotFiles
+from gaitswarm.simulation import SimulationView, run_simulation
 from gaitswarm.specs import checked
 from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.tables import TableFormat, encoded_table
@@ -124,7 +125,6 @@ from gaitswarm.views.job import (
 )
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
 from gaitswarm.views.robots import MeshFileView, RobotCheckView, RobotDraftView
-from gaitswarm.views.simulation import SimulationView
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import zipped

@@ -23,8 +23,8 @@ from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.shapes import Role
 from gaitswarm.sim.robot.urdf import SolidKind
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
+from gaitswarm.simulation import QUANTITIES
 from gaitswarm.views.robots import LinkMeshView
-from gaitswarm.views.simulation import QUANTITIES
 
 VERSION: Final = 1
 

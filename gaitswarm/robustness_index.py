@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
-from typing import Annotated, Final, NamedTuple, TypedDict, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,19 @@ from pydantic import Field, ValidationError
 from gaitswarm.designs import WalksRequest
 from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
-from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
+from gaitswarm.services.optimizer.analysis.preferences import (
+    IndexView,
+    PreferencesRequest,
+    RobustPreferencesView,
+)
+from gaitswarm.services.optimizer.analysis.preferences import (
+    robust_preferences as ranked_preferences,
+)
 from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View
 from gaitswarm.sim.case import Walk
@@ -33,19 +41,19 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Outcome, Status
-from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
-from gaitswarm.specs import RobotInput, ScenarioInput
+from gaitswarm.simulation import evaluated
+from gaitswarm.specs import RobotInput, ScenarioInput, checked
+
+if TYPE_CHECKING:
+    from gaitswarm.jobs.base import Jobs
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _RESAMPLES: Final = 400
 _SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
-
-_BLOCK: Final = 64
-"""Designs between two progress reports; a multiple of every kernel's lanes."""
 
 Progress = Callable[[int, int], None]
 """Called with the number of simulations done and their total."""
@@ -232,6 +240,98 @@ class RobustnessView(Sensitivities):
     objectives: list[ObjectiveView] = Field(description="Normalised objectives, f1 to f5.")
 
 
+def robustness(
+    design: Mapping[str, float | str],
+    *,
+    cpus: int | None = None,
+    progress: Progress | None = None,
+    **options: Unpack[RobustnessOptions],
+) -> RobustnessView:
+    """Estimate how robust a design is against small changes of its variables (thesis 4.4.3).
+
+    The index is the Frobenius norm of the Jacobian of the objectives' logarithms, f1 to f5 of table
+    4.1, by the variables as shares of their bounds: the smaller, the more robust. It comes from a
+    linear regression over designs that are drawn around the given one, as objectives are not
+    smooth.
+
+    Args:
+        design: Value of each of the controller's variables, and of any gait variable, in the
+            variables' units.
+        cpus: Threads; default all processors.
+        progress: Called with the number of simulations done and their total.
+        **options: Scenarios and sample, see `RobustnessOptions`.
+
+    Returns:
+        The index with its interval, by scenario, objective and variable.
+
+    Raises:
+        InvalidRequest: An argument is invalid; names it.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    request = checked(RobustnessRequest, {"design": design, **options})
+    with simulation_errors("design"):
+        return run_robustness(request, cpus=cpus, progress=progress)
+
+
+def robust_preferences(
+    jobs: Jobs,
+    job_id: str,
+    *,
+    drawn: int = 512,
+    candidates: int = 8,
+    samples: int = 128,
+    radius: float = 0.02,
+    seed: int = 1,
+    precision: Precision = "double",
+    progress: Progress | None = None,
+) -> RobustPreferencesView:
+    """Find the preference whose winner among a job's designs is the most robust.
+
+    The designs are ranked under A, B and C (table 4.5) and under preferences that are drawn at
+    random; the robustness index (thesis 4.4.3) of the winners is estimated by simulation. Only
+    designs of the job can win. `Jobs.preferences` simulates them where the jobs are.
+
+    Args:
+        jobs: Database or server of the job.
+        job_id: Identifier of a job that tunes a drive.
+        drawn: How many preferences to draw.
+        candidates: Winners to simulate: those of A, B and C, and of the others those that win under
+            most preferences.
+        samples: Designs to simulate around each; 0 for no simulation and no index.
+        radius: How far they are from it at most, as a share of each variable's bounds.
+        seed: Of preferences and samples.
+        precision: Of the physics' numbers.
+        progress: Called with the number of simulations done and their total.
+
+    Returns:
+        The candidates, the most robust first, with their loss under the job's own preference.
+
+    Raises:
+        InvalidRequest: The job tunes no drive, or an argument is invalid; names it.
+        Conflict: No design of the job succeeds in all scenarios.
+    """
+    document = {
+        "drawn": drawn,
+        "candidates": candidates,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+        "precision": precision,
+    }
+    request, table = checked(PreferencesRequest, document), jobs.evaluations(job_id)
+    columns = EvaluationColumns(
+        table.iteration,
+        table.particle,
+        table.designs,
+        table.objectives,
+        # Rankings do not distinguish failures.
+        np.where(table.statuses == Status.OK.label, Status.OK, Status.FELL).astype(np.uint8),
+        np.where(np.isfinite(table.fitness), table.fitness, np.inf),
+    )
+    index = partial(sampled_indices, progress=progress)
+    return ranked_preferences(job_id, jobs.job(job_id).spec, columns, request, index)
+
+
 def run_robustness(
     request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
 ) -> RobustnessView:
@@ -272,31 +372,21 @@ def run_robustness(
 
 def _walked(
     request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
-) -> list[Outcome]:
+) -> tuple[Outcome, ...]:
     """Simulate the sample; one outcome per scenario."""
-    from gaitswarm.services.runtime import open_evaluator
-
-    cases = tuple(
+    cases = [
         Walk(request.robot, request.controller, scenario, sample.names, request.precision)
         for scenario in request.resolved_scenarios()
-    )
-    provenance = provenance_of(request.robot, precision=request.precision)
-    blocks: list[tuple[Outcome, ...]] = []
-    n = len(sample.designs)
-    with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
-        for first in range(0, n, _BLOCK):
-            designs = sample.designs[first : first + _BLOCK]
-            asked = EvaluationRequest("", cases, designs, provenance)
-            blocks.append(evaluator.evaluate(asked, lambda: False))
-            if progress is not None:
-                progress(min(first + _BLOCK, n) * len(cases), n * len(cases))
-    return [
-        Outcome(
-            np.concatenate([part.objectives for part in parts]),
-            np.concatenate([part.statuses for part in parts]),
-        )
-        for parts in zip(*blocks, strict=True)
     ]
+    done, planned = 0, len(sample.designs) * len(cases)
+
+    def report(task: TaskReport) -> None:
+        nonlocal done
+        done += task.walks if task.error is None else 0
+        if progress is not None:
+            progress(done, planned)
+
+    return evaluated(cases, sample.designs, request.precision, cpus=cpus, on_task=report)
 
 
 def sampled_indices(

@@ -1,50 +1,371 @@
-"""`gaitswarm.simulate` and `robustness`: simulations outside any job."""
+"""Simulations of designs outside any job: `gaitswarm.simulate`, its results, and their JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from typing import Final, Protocol, TypeAlias, Unpack, get_args
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, Self, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, WithJsonSchema
 
 from gaitswarm.designs import SimulationRequest
 from gaitswarm.errors import InvalidRequest, simulation_errors
-from gaitswarm.robustness_index import (
-    Progress,
-    RobustnessOptions,
-    RobustnessRequest,
-    RobustnessView,
-    run_robustness,
-)
-from gaitswarm.services.optimizer.jobs.preference import judge
-from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView
+from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask
+from gaitswarm.services.optimizer.views import Finite, View, finite
 from gaitswarm.sim.assembly import Backend
 from gaitswarm.sim.case import Case, MeasuredWalk
-from gaitswarm.sim.catalogue import design_catalogue
+from gaitswarm.sim.catalogue import design_catalogue, design_numbers, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.gait.stability import Stability, static_stability
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
-from gaitswarm.sim.provenance import provenance_of
-from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.sim.scenario import SCENARIOS, Scenario
-from gaitswarm.sim.simulate import Simulation
-from gaitswarm.sim.simulate import simulate as simulate_walk
-from gaitswarm.sim.worlds import MeasuredPerturbedWalk
-from gaitswarm.simulation_result import SimulationResult
-from gaitswarm.specs import (
-    PreferenceInput,
-    RobotInput,
-    ScenarioInput,
-    checked,
+from gaitswarm.sim.outcome import (
+    MEASUREMENT_NAMES,
+    N_OBJECTIVES,
+    OBJECTIVE_NAMES,
+    Outcome,
+    Status,
 )
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput, checked
+from gaitswarm.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 
 ALL_SCENARIOS: Final = tuple(scenario.name for scenario in SCENARIOS)
 """The six scenarios of table 4.2."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScenarioResult:
+    """Results of n designs in one scenario.
+
+    Attributes:
+        statuses: How each simulation ended; everything but `Status.OK` is a failure.
+        objectives: (n,) raw objectives by name, to be minimized, NaN where there is none;
+            `gaitswarm.OBJECTIVES` has their units.
+        measurements: (n,) further quantities by name, NaN where a simulation
+            ended early; `gaitswarm.MEASUREMENTS` has their units.
+        utility: (n,) bias-weighted product (eq. 3.8, 4.1), to be minimized; NaN where the
+            simulation failed.
+        logs: Logs at 500 Hz, None for a gait out of reach; empty unless requested.
+    """
+
+    statuses: tuple[Status, ...]
+    objectives: Mapping[str, Floats]
+    measurements: Mapping[str, Floats]
+    utility: Floats
+    logs: tuple[WalkLog | None, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulationResult:
+    """Results of n designs in K scenarios; `result["normal-fast"]` is one scenario's part.
+
+    Attributes:
+        robot: The robot.
+        controller: The controller.
+        preference: By which utilities and fitness were computed.
+        precision: Of the physics' numbers.
+        variables: Names of the v variables of the designs.
+        designs: (n, v) their values, in the variables' units.
+        scenarios: Names of the K scenarios.
+        statuses: (n, K) values of `Status`.
+        objectives: (n, K, 6) raw objectives f1..f6 of table 4.1, to be minimized, in the units of
+            `gaitswarm.OBJECTIVES`; NaN where there is none.
+        measurements: (n, K, 5) peak and mean current, motor heat, power and speed, in the order and
+            units of `gaitswarm.MEASUREMENTS`; NaN for a simulation that ended early.
+        utilities: (n, K) bias-weighted products (eq. 3.8, 4.1), to be minimized; NaN where
+            the simulation failed.
+        fitness: (n,) geometric means of the utilities (eq. 4.2), to be minimized; NaN where any
+            simulation failed.
+        logs: Logs by scenario, in the order of the designs; empty unless requested.
+    """
+
+    robot: RobotSource
+    controller: str
+    preference: Preference
+    precision: Precision
+    variables: tuple[str, ...]
+    designs: Floats
+    scenarios: tuple[str, ...]
+    statuses: NDArray[np.uint8]
+    objectives: Floats
+    measurements: Floats
+    utilities: Floats
+    fitness: Floats
+    logs: Mapping[str, tuple[WalkLog | None, ...]] = field(repr=False, default_factory=dict)
+
+    @classmethod
+    def from_view(cls, view: SimulationView) -> Self:
+        """Convert a server's answer to arrays.
+
+        Args:
+            view: Result of one design.
+        """
+        results = list(view.scenarios.values())
+        values = [[list(result.objectives.values()) for result in results]]
+        measured = [[getattr(r.measurements, m) for m in MEASUREMENT_NAMES] for r in results]
+        logs = {
+            name: (None if result.log is None else result.log.walk_log(),)
+            for name, result in view.scenarios.items()
+        }
+        recorded = any(log is not None for walks in logs.values() for log in walks)
+        return cls(
+            robot=view.robot,
+            controller=view.controller,
+            preference=view.preference,
+            precision=view.precision,
+            variables=tuple(view.design),
+            designs=np.array([list(design_numbers(view.controller, view.design).values())]),
+            scenarios=tuple(view.scenarios),
+            statuses=np.array([[Status.from_label(r.status) for r in results]], dtype=np.uint8),
+            objectives=np.array(values, dtype=np.float64),
+            measurements=np.array([measured], dtype=np.float64),
+            utilities=np.array([[result.utility for result in results]], dtype=np.float64),
+            fitness=np.array([view.fitness], dtype=np.float64),
+            logs=logs if recorded else {},
+        )
+
+    @property
+    def figure_of_merit(self) -> Floats:
+        """(n,) F of eq. 3.1, to be maximized; NaN unless the preference is `chapter-3`."""
+        values = [figure_of_merit(fitness, self.preference) for fitness in self.fitness.tolist()]
+        return np.array(values, dtype=np.float64)
+
+    def __getitem__(self, scenario: str) -> ScenarioResult:
+        k = self.scenarios.index(scenario) if scenario in self.scenarios else None
+        if k is None:
+            raise KeyError(f"{scenario!r}; simulated were {', '.join(self.scenarios)}")
+        return ScenarioResult(
+            statuses=tuple(Status(status) for status in self.statuses[:, k].tolist()),
+            objectives=dict(zip(OBJECTIVE_NAMES, self.objectives[:, k].T, strict=True)),
+            measurements=dict(zip(MEASUREMENT_NAMES, self.measurements[:, k].T, strict=True)),
+            utility=self.utilities[:, k],
+            logs=self.logs.get(scenario, ()),
+        )
+
+    def table(self) -> Table:
+        """One row for every simulation, by design and scenario.
+
+        Returns:
+            A table with the columns design (index from 0), scenario, status, utility, the
+            objectives and measurements by name, and `design.<variable>`.
+        """
+        n, k = self.statuses.shape
+        columns: dict[str, NDArray[Any]] = {
+            "design": np.repeat(np.arange(n), k),
+            "scenario": np.tile(np.array(self.scenarios), n),
+            "status": np.array([Status(s).label for s in self.statuses.ravel().tolist()]),
+            "utility": self.utilities.ravel(),
+        }
+        columns |= {
+            name: self.objectives[:, :, m].ravel() for m, name in enumerate(OBJECTIVE_NAMES)
+        }
+        columns |= {
+            name: self.measurements[:, :, m].ravel() for m, name in enumerate(MEASUREMENT_NAMES)
+        }
+        for name, values in zip(self.variables, self.designs.T, strict=True):
+            columns[f"design.{name}"] = np.repeat(values, k)
+        return Table(columns)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """`table()` as a data frame. Raises ImportError without pandas."""
+        return self.table().to_pandas()
+
+
+LOG_RATE: Final = 500
+"""Rows of a log per second of simulated time [Hz]."""
+
+LogValues = Annotated[list[Any], WithJsonSchema({"type": "array", "items": {}})]
+
+QUANTITIES: Final[dict[str, tuple[str, str]]] = {
+    "time": ("s", "time since the start"),
+    "base_position": ("m", "position of the body in the world: x, y, z"),
+    "base_orientation": ("1", "orientation of the body in the world: quaternion x, y, z, w"),
+    "base_velocity": ("m/s, rad/s", "velocity in the body frame: 3 linear, then 3 angular"),
+    "joint_angle": ("rad", "angle of every joint"),
+    "motor_angle": ("rad", "angle of every joint at its encoder, before any backlash"),
+    "joint_velocity": ("rad/s", "angular velocity of every joint"),
+    "desired_angle": ("rad", "desired angle of every joint"),
+    "current": ("A", "motor current of every joint"),
+    "voltage": ("V", "motor voltage of every joint"),
+    "load_torque": ("N m", "gear torque of every joint"),
+    "foot_force": ("N", "force of the ground on every foot in the world frame: x, y, z"),
+    "supply": ("V", "voltage of the battery"),
+}
+"""Arrays of a `WalkLog`, unit and description of each."""
+
+
+class LogColumnView(View):
+    """One recorded quantity."""
+
+    unit: str = Field(description="Unit of the values.", examples=["rad"])
+    description: str = Field(
+        description="Meaning of the column.", examples=["angle of every joint"]
+    )
+    values: LogValues = Field(
+        description="One entry per row: a number, or nested lists where there are several joints,"
+        " legs or coordinates; null where undefined.",
+        examples=[[[0.0, 0.1], [0.01, 0.11]]],
+    )
+
+
+class WalkLogView(View):
+    """Log of a simulation, column by column."""
+
+    rate: int = Field(
+        default=LOG_RATE, description="Rows per second of simulated time [Hz].", examples=[500]
+    )
+    columns: dict[str, LogColumnView] = Field(
+        description="Recorded quantities by name: " + ", ".join(QUANTITIES) + "."
+    )
+
+    @classmethod
+    def from_log(cls, log: WalkLog) -> WalkLogView:
+        """Make a view of all arrays of a log; what is not finite is null."""
+        # model_construct does not check hundreds of thousands of numbers.
+        return cls.model_construct(
+            rate=LOG_RATE,
+            columns={
+                name: LogColumnView.model_construct(
+                    unit=unit, description=description, values=_nullable(getattr(log, name))
+                )
+                for name, (unit, description) in QUANTITIES.items()
+            },
+        )
+
+    def walk_log(self) -> WalkLog:
+        """The log as arrays."""
+        arrays = {name: np.array(c.values, np.float64) for name, c in self.columns.items()}
+        return WalkLog(**arrays)
+
+
+class MeasurementsView(View):
+    """Measurements of a simulation besides its objectives; null where it ended early."""
+
+    peak_current: Finite = Field(
+        default=None,
+        description="Largest absolute current of any motor at any physics step [A].",
+        examples=[0.83],
+    )
+    mean_current: Finite = Field(
+        default=None, description="Mean absolute current of all motors [A].", examples=[0.12]
+    )
+    motor_heat: Finite = Field(
+        default=None, description="Mean heat in all windings, R I^2 [W].", examples=[1.6]
+    )
+    power: Finite = Field(
+        default=None, description="Mean electrical power of all motors [W].", examples=[12.4]
+    )
+    speed: Finite = Field(default=None, description="Mean forward speed [m/s].", examples=[0.187])
+
+
+class PlannedGaitView(View):
+    """Properties of a planned gait, without simulation."""
+
+    duty_factor: float = Field(
+        description="Support's share of the cycle, mean of all legs [1].", examples=[0.56]
+    )
+    fewest_feet: int = Field(description="That stand at any moment.", examples=[3])
+    margin: float | None = Field(
+        description="Least distance of the centre of mass from the edge of the support polygon [m],"
+        " negative outside; null while no foot stands.",
+        examples=[0.041],
+    )
+    stable: bool = Field(description="Whether the gait is statically stable: margin above 0.")
+
+
+class SimulatedScenarioView(ScenarioResultView):
+    """Result of the design in one scenario, with its log if requested."""
+
+    measurements: MeasurementsView = Field(
+        default_factory=MeasurementsView,
+        description="Currents, heat, power and speed of the walk.",
+    )
+    gait: PlannedGaitView | None = Field(
+        default=None, description="The planned gait: duty factor and static stability."
+    )
+    log: WalkLogView | None = Field(
+        default=None,
+        description="Log at 500 Hz; null unless requested, or if the robot never moved.",
+    )
+
+
+class SimulationView(View):
+    """Results of one design."""
+
+    robot: RobotSource = Field(description="The robot, as requested.", examples=["szabadka2"])
+    controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
+    design: dict[str, float | str] = Field(
+        description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
+    )
+    preference: Preference = Field(description="By which utilities and fitness were computed.")
+    precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
+    fitness: float | None = Field(
+        description="Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1];"
+        " null if any walk failed.",
+        examples=[20.87],
+    )
+    figure_of_merit: float | None = Field(
+        default=None,
+        description="To be maximized: F of eq. 3.1 [1], which is 1e5 / `fitness` under the"
+        " preference chapter-3; null under any other, and if any walk failed.",
+        examples=[6.9],
+    )
+    scenarios: dict[str, SimulatedScenarioView] = Field(
+        description="Result in each scenario, by the scenario's name."
+    )
+
+    @classmethod
+    def from_result(cls, result: SimulationResult, gaits: Iterable[Stability]) -> SimulationView:
+        """Make a view of one design's simulations, with its gait in each scenario."""
+        design = dict(zip(result.variables, result.designs[0].tolist(), strict=True))
+        return cls(
+            robot=result.robot,
+            controller=result.controller,
+            design=design_shown(result.controller, design),
+            preference=result.preference,
+            precision=result.precision,
+            fitness=finite(result.fitness.item()),
+            figure_of_merit=finite(result.figure_of_merit.item()),
+            scenarios={
+                name: SimulatedScenarioView.model_validate(
+                    {
+                        "status": part.statuses[0].label,
+                        "explanation": part.statuses[0].phrase,
+                        "utility": finite(part.utility.item()),
+                        "objectives": {n: finite(v.item()) for n, v in part.objectives.items()},
+                        "measurements": {n: v.item() for n, v in part.measurements.items()},
+                        "gait": PlannedGaitView.model_validate(gait),
+                        "log": next((WalkLogView.from_log(log) for log in part.logs if log), None),
+                    }
+                )
+                for name, gait in zip(result.scenarios, gaits, strict=True)
+                for part in (result[name],)
+            },
+        )
+
+
+def _nullable(array: NDArray[np.float64]) -> list[Any]:
+    """Nested lists of the array; None for what is not finite."""
+    if np.isfinite(array).all():
+        rows: list[Any] = array.tolist()
+        return rows
+    values = array.astype(object)
+    values[~np.isfinite(array)] = None
+    marked: list[Any] = values.tolist()
+    return marked
 
 
 class Columns(Protocol):
@@ -133,40 +454,87 @@ def simulate(
     if cpus is not None and cpus < 1:
         raise InvalidRequest("must be at least 1", field="cpus")
     with simulation_errors("designs"):
-        return _simulated(request, variables, rows, backend, cpus)
+        return _simulated(request, rows, backend=backend, cpus=cpus)
 
 
-def robustness(
-    design: Mapping[str, float | str],
+def run_simulation(request: SimulationRequest) -> SimulationView:
+    """Simulate the request's design in every scenario."""
+    request.check_walks()
+    robot = load_robot(request.robot)
+    design = np.array([tuple(request.numbers.values())], dtype=np.float64)
+    return SimulationView.from_result(
+        _simulated(request, design),
+        [static_stability(robot, request.walked(s)) for s in request.resolved_scenarios()],
+    )
+
+
+def _simulated(
+    request: SimulationRequest,
+    designs: Floats,
+    *,
+    backend: Backend = "auto",
+    cpus: int | None = None,
+) -> SimulationResult:
+    """Simulate designs with the variables of the request's, many of them in threads."""
+    scenarios, variables = request.resolved_scenarios(), tuple(request.design)
+    logs: dict[str, tuple[WalkLog | None, ...]] = {}
+    if len(designs) == 1 or request.log or backend != "auto":
+        parts = []
+        for scenario in scenarios:
+            walk = request.walk(
+                scenario, designs, log=request.log, precision=request.precision, backend=backend
+            )
+            columns = [walk.outcome.objectives, walk.measurements.array()]
+            parts.append(Outcome(np.concatenate(columns, axis=1), walk.outcome.statuses))
+            if request.log:
+                logs[scenario.name] = walk.logs
+    else:
+        cases = [
+            request.perturbed_walk(scenario, request.precision)
+            if request.world
+            else MeasuredWalk(
+                request.robot, request.controller, scenario, variables, request.precision
+            )
+            for scenario in scenarios
+        ]
+        parts = list(evaluated(cases, designs, request.precision, cpus=cpus))
+    statuses = np.stack([part.statuses for part in parts], axis=1)
+    columns_by_walk = np.stack([part.objectives for part in parts], axis=1)
+    objectives, measurements = np.split(columns_by_walk, [N_OBJECTIVES], axis=2)
+    preference = request.resolved_preference()
+    judged = judge(objectives, statuses != Status.OK, preference)
+    return SimulationResult(
+        robot=request.robot,
+        controller=request.controller,
+        preference=preference,
+        precision=request.precision,
+        variables=variables,
+        designs=designs,
+        scenarios=tuple(scenario.name for scenario in scenarios),
+        statuses=statuses,
+        objectives=objectives,
+        measurements=measurements,
+        utilities=np.where(np.isfinite(judged.utilities), judged.utilities, np.nan),
+        fitness=np.where(np.isfinite(judged.fitness), judged.fitness, np.nan),
+        logs=logs,
+    )
+
+
+def evaluated(
+    cases: Sequence[Case],
+    designs: Floats,
+    precision: Precision,
     *,
     cpus: int | None = None,
-    progress: Progress | None = None,
-    **options: Unpack[RobustnessOptions],
-) -> RobustnessView:
-    """Estimate how robust a design is against small changes of its variables (thesis 4.4.3).
+    on_task: OnTask | None = None,
+) -> tuple[Outcome, ...]:
+    """Evaluate designs in cases of the same robots, in threads of this process."""
+    from gaitswarm.services.runtime import open_evaluator
 
-    The index is the Frobenius norm of the Jacobian of the objectives' logarithms, f1 to f5 of table
-    4.1, by the variables as shares of their bounds: the smaller, the more robust. It comes from a
-    linear regression over designs that are drawn around the given one, as objectives are not
-    smooth.
-
-    Args:
-        design: Value of each of the controller's variables, and of any gait variable, in the
-            variables' units.
-        cpus: Threads; default all processors.
-        progress: Called with the number of simulations done and their total.
-        **options: Scenarios and sample, see `RobustnessOptions`.
-
-    Returns:
-        The index with its interval, by scenario, objective and variable.
-
-    Raises:
-        InvalidRequest: An argument is invalid; names it.
-        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
-    """
-    request = checked(RobustnessRequest, {"design": design, **options})
-    with simulation_errors("design"):
-        return run_robustness(request, cpus=cpus, progress=progress)
+    provenance = provenance_of(*cases[0].robots, precision=precision)
+    asked = EvaluationRequest("", tuple(cases), designs, provenance, on_task=on_task)
+    with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
+        return evaluator.evaluate(asked, lambda: False)
 
 
 def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floats]:
@@ -206,109 +574,3 @@ def _by_variable(designs: DesignInput) -> dict[str, ArrayLike]:
         if design.keys() != designs[0].keys():
             raise KeyError("designs differ in their variables")
     return {name: [design[name] for design in designs] for name in (designs[0] if designs else ())}
-
-
-def _simulated(
-    request: SimulationRequest,
-    variables: tuple[str, ...],
-    designs: Floats,
-    backend: Backend,
-    cpus: int | None,
-) -> SimulationResult:
-    """Simulate all designs; `request` is that of the first."""
-    scenarios = request.resolved_scenarios()
-    logs: dict[str, tuple[WalkLog | None, ...]] = {}
-    if len(designs) == 1 or request.log or backend != "auto":
-        parts = []
-        for scenario in scenarios:
-            walk = _walked(request, scenario, variables, designs, backend)
-            columns = [walk.outcome.objectives, walk.measurements.array()]
-            parts.append(Outcome(np.concatenate(columns, axis=1), walk.outcome.statuses))
-            if request.log:
-                logs[scenario.name] = walk.logs
-    else:
-        parts = list(_in_parallel(request, scenarios, variables, designs, cpus))
-    statuses = np.stack([part.statuses for part in parts], axis=1)
-    columns_by_walk = np.stack([part.objectives for part in parts], axis=1)
-    objectives, measurements = np.split(columns_by_walk, [N_OBJECTIVES], axis=2)
-    preference = request.resolved_preference()
-    judged = judge(objectives, statuses != Status.OK, preference)
-    return SimulationResult(
-        robot=request.robot,
-        controller=request.controller,
-        preference=preference,
-        precision=request.precision,
-        variables=variables,
-        designs=designs,
-        scenarios=tuple(scenario.name for scenario in scenarios),
-        statuses=statuses,
-        objectives=objectives,
-        measurements=measurements,
-        utilities=_finite(judged.utilities),
-        fitness=_finite(judged.fitness),
-        logs=logs,
-    )
-
-
-def _walked(
-    request: SimulationRequest,
-    scenario: Scenario,
-    variables: tuple[str, ...],
-    designs: Floats,
-    backend: Backend,
-) -> Simulation:
-    """Simulate all designs in one scenario in this thread."""
-    if request.world:
-        return _in_world(request, scenario, variables).simulate(designs, log=request.log)
-    return simulate_walk(
-        scenario,
-        request.controller,
-        variables,
-        designs,
-        robot=request.robot,
-        log=request.log,
-        backend=backend,
-        precision=request.precision,
-    )
-
-
-def _in_world(
-    request: SimulationRequest, scenario: Scenario, variables: tuple[str, ...]
-) -> MeasuredPerturbedWalk:
-    return MeasuredPerturbedWalk(
-        scenario.name,
-        request.robot,
-        request.controller,
-        scenario,
-        tuple(request.world.items()),
-        variables,
-        request.precision,
-    )
-
-
-def _in_parallel(
-    request: SimulationRequest,
-    scenarios: Sequence[Scenario],
-    variables: tuple[str, ...],
-    designs: Floats,
-    cpus: int | None,
-) -> Sequence[Outcome]:
-    """Objectives and measurements for every scenario, computed in threads."""
-    from gaitswarm.services.runtime import open_evaluator
-
-    cases: tuple[Case, ...]
-    if request.world:
-        cases = tuple(_in_world(request, scenario, variables) for scenario in scenarios)
-    else:
-        cases = tuple(
-            MeasuredWalk(request.robot, request.controller, s, variables, request.precision)
-            for s in scenarios
-        )
-    with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
-        provenance = provenance_of(request.robot, precision=request.precision)
-        asked = EvaluationRequest("", cases, designs, provenance)
-        return evaluator.evaluate(asked, lambda: False)
-
-
-def _finite(values: Floats) -> Floats:
-    return np.where(np.isfinite(values), values, np.nan)

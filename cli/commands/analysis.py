@@ -44,7 +44,7 @@ if TYPE_CHECKING:
         ScenarioFamiliesView,
     )
     from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
-    from gaitswarm.views.simulation import SimulationView
+    from gaitswarm.simulation import SimulationView
 
 
 def rank(
@@ -413,7 +413,7 @@ def preferences(
     Ranks stored designs under many preferences, and estimates the robustness index of the winners
     by simulation. With --for, finds the preference that makes a design the best.
     """
-    from gaitswarm.preferences import robust_preferences
+    from gaitswarm.robustness_index import robust_preferences
     from gaitswarm.settings import read_place
 
     if for_design is not None:

@@ -378,7 +378,8 @@ def _replayed(
     spec: CertificateSpec, world: int, log: Path | None
 ) -> tuple[dict[str, Any], Iterator[Table | str]]:
     """Simulate a certificate's design in one world."""
-    from gaitswarm.designs import SimulationRequest, run_simulation
+    from gaitswarm.designs import SimulationRequest
+    from gaitswarm.simulation import run_simulation
 
     request = SimulationRequest(
         robot=spec.robot,

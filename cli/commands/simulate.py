@@ -22,7 +22,7 @@ from gaitswarm.cli.tables import gait_in_words, number, results_table, table, wo
 if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.views.simulation import SimulationView
+    from gaitswarm.simulation import SimulationView
 
 
 def simulate(
@@ -69,8 +69,9 @@ def simulate(
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
     from gaitswarm.cli.inputs.spec_file import json_object
-    from gaitswarm.designs import SimulationRequest, run_simulation
+    from gaitswarm.designs import SimulationRequest
     from gaitswarm.errors import invalid_request
+    from gaitswarm.simulation import run_simulation
 
     given = given_design(design, controller, trajectory, robot=robot, place=place)
     data: dict[str, Any] = {

@@ -28,7 +28,7 @@ from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.simulation import SimulationResult
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,

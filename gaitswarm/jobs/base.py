@@ -50,7 +50,7 @@ from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.simulation import SimulationResult
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from gaitswarm.api.dependencies import ComputingCapacity
-from gaitswarm.designs import SimulationRequest, run_simulation
+from gaitswarm.designs import SimulationRequest
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.scenario import find_scenario
-from gaitswarm.views.simulation import SimulationView
+from gaitswarm.simulation import SimulationView, run_simulation
 from tests.api.conftest import Serve
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 

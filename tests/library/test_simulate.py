@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from gaitswarm.designs import SimulationRequest, run_simulation
+from gaitswarm.designs import SimulationRequest
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
+from gaitswarm.simulation import run_simulation
 from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow

@@ -46,14 +46,14 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
     from gaitswarm.jobs.server import ServerJobs
-    from gaitswarm.optimization import OptimizationResult, optimize, optimizers
-    from gaitswarm.replay import WalkReplay
-    from gaitswarm.robustness_index import (
-        RobustnessOptions,
-        RobustnessView,
+    from gaitswarm.optimization import (
+        OptimizationResult,
+        optimize,
+        optimizers,
         robust_preferences,
-        robustness,
     )
+    from gaitswarm.replay import WalkReplay
+    from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
     from gaitswarm.services.optimizer.analysis.certificate import CertificateView
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
@@ -136,7 +136,9 @@ _MODULES: Final = {
     "gaitswarm.jobs.database": ("DatabaseJobs",),
     "gaitswarm.jobs.open": ("connect", "connect_async", "open", "open_async"),
     "gaitswarm.jobs.server": ("ServerJobs",),
-    "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
+    "gaitswarm.optimization": (
+        "OptimizationResult", "optimize", "optimizers", "robust_preferences",
+    ),
     "gaitswarm.simulation": ("ScenarioResult", "SimulationResult", "simulate"),
     "gaitswarm.specs": ("SpecOptions", "job_spec"),
     "gaitswarm.tables": ("EvaluationTable", "Table"),
@@ -156,9 +158,7 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.analysis.comparison": ("JobComparisonView",),
     "gaitswarm.services.optimizer.analysis.identifiability": ("IdentifiabilityView",),
     "gaitswarm.replay": ("WalkReplay",),
-    "gaitswarm.robustness_index": (
-        "RobustnessOptions", "RobustnessView", "robust_preferences", "robustness",
-    ),
+    "gaitswarm.robustness_index": ("RobustnessOptions", "RobustnessView", "robustness"),
     "gaitswarm.surface": ("SurfaceView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),

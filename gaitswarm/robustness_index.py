@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple, TypedDict, TypeVar, Unpack
+from typing import Annotated, Final, NamedTuple, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,17 +19,9 @@ from pydantic import Field, ValidationError
 from gaitswarm.designs import WalksRequest
 from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
-from gaitswarm.services.optimizer.analysis.preferences import (
-    IndexView,
-    PreferencesRequest,
-    RobustPreferencesView,
-)
-from gaitswarm.services.optimizer.analysis.preferences import (
-    robust_preferences as ranked_preferences,
-)
+from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
 from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
@@ -45,9 +36,6 @@ from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
 from gaitswarm.simulation import evaluated
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
-
-if TYPE_CHECKING:
-    from gaitswarm.jobs.base import Jobs
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -271,65 +259,6 @@ def robustness(
     request = checked(RobustnessRequest, {"design": design, **options})
     with simulation_errors("design"):
         return run_robustness(request, cpus=cpus, progress=progress)
-
-
-def robust_preferences(
-    jobs: Jobs,
-    job_id: str,
-    *,
-    drawn: int = 512,
-    candidates: int = 8,
-    samples: int = 128,
-    radius: float = 0.02,
-    seed: int = 1,
-    precision: Precision = "double",
-    progress: Progress | None = None,
-) -> RobustPreferencesView:
-    """Find the preference whose winner among a job's designs is the most robust.
-
-    The designs are ranked under A, B and C (table 4.5) and under preferences that are drawn at
-    random; the robustness index (thesis 4.4.3) of the winners is estimated by simulation. Only
-    designs of the job can win. `Jobs.preferences` simulates them where the jobs are.
-
-    Args:
-        jobs: Database or server of the job.
-        job_id: Identifier of a job that tunes a drive.
-        drawn: How many preferences to draw.
-        candidates: Winners to simulate: those of A, B and C, and of the others those that win under
-            most preferences.
-        samples: Designs to simulate around each; 0 for no simulation and no index.
-        radius: How far they are from it at most, as a share of each variable's bounds.
-        seed: Of preferences and samples.
-        precision: Of the physics' numbers.
-        progress: Called with the number of simulations done and their total.
-
-    Returns:
-        The candidates, the most robust first, with their loss under the job's own preference.
-
-    Raises:
-        InvalidRequest: The job tunes no drive, or an argument is invalid; names it.
-        Conflict: No design of the job succeeds in all scenarios.
-    """
-    document = {
-        "drawn": drawn,
-        "candidates": candidates,
-        "samples": samples,
-        "radius": radius,
-        "seed": seed,
-        "precision": precision,
-    }
-    request, table = checked(PreferencesRequest, document), jobs.evaluations(job_id)
-    columns = EvaluationColumns(
-        table.iteration,
-        table.particle,
-        table.designs,
-        table.objectives,
-        # Rankings do not distinguish failures.
-        np.where(table.statuses == Status.OK.label, Status.OK, Status.FELL).astype(np.uint8),
-        np.where(np.isfinite(table.fitness), table.fitness, np.inf),
-    )
-    index = partial(sampled_indices, progress=progress)
-    return ranked_preferences(job_id, jobs.job(job_id).spec, columns, request, index)
 
 
 def run_robustness(

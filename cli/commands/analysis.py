@@ -413,7 +413,7 @@ def preferences(
     Ranks stored designs under many preferences, and estimates the robustness index of the winners
     by simulation. With --for, finds the preference that makes a design the best.
     """
-    from gaitswarm.robustness_index import robust_preferences
+    from gaitswarm.optimization import robust_preferences
     from gaitswarm.settings import read_place
 
     if for_design is not None:

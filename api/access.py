@@ -21,7 +21,6 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from gaitswarm.api.dependencies import ExistingJob, ServerSettings
 from gaitswarm.api.events import Revocation
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
-from gaitswarm.services.monitoring.exposition import REFUSAL
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token
 from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
@@ -65,6 +64,10 @@ _IPV6_PREFIX: Final = 64
 
 UNKNOWN: Final = (
     "the token is unknown or was revoked; `gaitswarm token create NAME` creates a new one"
+)
+_METRICS_MISSING: Final = (
+    "metrics require a token: let Prometheus send one of scope `read` as `Authorization: Bearer"
+    " TOKEN`; create one with `gaitswarm token create NAME --scope read`"
 )
 _MISSING: Final = (
     "this server requires a token: send `Authorization: Bearer TOKEN`, or set GAITSWARM_TOKEN; an"
@@ -173,7 +176,6 @@ class AccessMiddleware:
         self._guesses = guesses
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
         path = scope.get("path", "").removeprefix(scope.get("root_path", ""))
         is_guarded = path.startswith(f"{PREFIX}/") or path == METRICS_PATH
         if scope["type"] != "http" or not is_guarded or path in _PROBES:
@@ -202,7 +204,7 @@ class AccessMiddleware:
                     self._guesses.count(address)
                     return unauthorized(scope["path"], UNKNOWN)
             elif self.required:
-                missing = REFUSAL if path == METRICS_PATH else _MISSING
+                missing = _METRICS_MISSING if path == METRICS_PATH else _MISSING
                 return unauthorized(scope["path"], missing)
         until_revoked = _never if secret is None else partial(self._tokens.until_revoked, secret)
         scope.setdefault("state", {}).update(token=token, until_revoked=until_revoked)

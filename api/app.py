@@ -9,25 +9,18 @@ from typing import Final
 from fastapi import FastAPI, Request, Response
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
+from starlette.routing import Route
 
 from gaitswarm.api import health, routes, session
 from gaitswarm.api.access import METRICS_PATH, AccessMiddleware, TokenGuesses
 from gaitswarm.api.dependencies import Component, lifespan
 from gaitswarm.api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
-from gaitswarm.api.middleware import (
-    BodyLimitMiddleware,
-    HostMiddleware,
-    MetricsMiddleware,
-    RequestIdMiddleware,
-    SameOriginMiddleware,
-    SecurityHeadersMiddleware,
-)
+from gaitswarm.api.middleware import BodyLimitMiddleware, OriginMiddleware, ResponseMiddleware
 from gaitswarm.api.page import MANUAL_FOLDER, PAGE_FOLDER, add_manual, add_page
 from gaitswarm.api.problems import add_problem_handlers
 from gaitswarm.operations import record_measured_walk
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.collectors import QueueCollector
-from gaitswarm.services.monitoring.hosts import HostNames
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.jobs.provenance import installed_version
 from gaitswarm.services.optimizer.service import JobService
@@ -75,7 +68,7 @@ def create_app(
     for router in (routes.router, session.router, health.router):
         app.router.routes.extend(router.routes)
     health.add_short_paths(app)
-    _add_metrics(app, metrics)
+    app.router.routes.append(metrics_route(metrics))
     add_documentation(app)
     add_page(app, page_folder)
     add_manual(app, manual_folder)
@@ -99,18 +92,16 @@ def create_app(
         guesses=guesses,
         required=settings.tokens_required,
     )
-    allowed = settings.api_allowed_hosts
-    app.add_middleware(SameOriginMiddleware, allowed=allowed)
-    app.add_middleware(HostMiddleware, names=HostNames(settings.api_host, allowed))
-    app.add_middleware(RequestIdMiddleware)
-    app.add_middleware(MetricsMiddleware, metrics=metrics)
-    app.add_middleware(SecurityHeadersMiddleware)
+    app.add_middleware(OriginMiddleware, host=settings.api_host, allowed=settings.api_allowed_hosts)
+    app.add_middleware(ResponseMiddleware, metrics=metrics)
     return app
 
 
-def _add_metrics(app: FastAPI, metrics: Metrics) -> None:
+def metrics_route(metrics: Metrics) -> Route:
+    """Return the route of a process's metrics."""
+
     def answer(request: Request) -> Response:
         text, media_type = metrics.exposition(request.headers.get("accept", ""))
         return Response(text, headers={"Content-Type": media_type, "Cache-Control": "no-store"})
 
-    app.add_route(METRICS_PATH, answer, include_in_schema=False)
+    return Route(METRICS_PATH, answer, include_in_schema=False)

@@ -1,11 +1,10 @@
-"""Documentation of the API: the OpenAPI document with links, and /docs."""
+"""Documentation of the API: the OpenAPI document, and /docs."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import re
-from collections.abc import Iterator
 from typing import Any, Final, cast
 
 from fastapi import FastAPI, Request, Response
@@ -82,28 +81,6 @@ _SCHEMAS: Final = "#/components/schemas/"
 
 _INLINE_SCRIPT: Final = re.compile(rb"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
-_SOURCES: Final[dict[str, dict[str, str]]] = {
-    "submit_job": {"job_id": "$response.body#/id"},
-    "fork_job": {"job_id": "$response.body#/id"},
-    "list_jobs": {"job_id": "$response.body#/items/0/id"},
-    "list_iterations": {
-        "job_id": "$request.path.job_id",
-        "iteration": "$response.body#/items/0/index",
-    },
-    "list_recordings": {"recording_id": "$response.body#/items/0/id"},
-    "add_recording": {"recording_id": "$response.body#/id"},
-    "record_measured_walk": {"recording_id": "$response.body#/recording/id"},
-}
-"""OpenAPI links: parameters of other operations that a response contains."""
-
-_ONLY: Final = {
-    "list_jobs": frozenset({"get_job", "list_iterations"}),
-    "list_iterations": frozenset({"list_evaluations", "get_preference_for"}),
-}
-"""Targets of links, if not every operation with one of the parameters in its path."""
-
-_PARAMETER: Final = re.compile(r"\{(\w+)\}")
-
 Responses = dict[int | str, dict[str, Any]]
 
 
@@ -136,7 +113,6 @@ def add_documentation(app: FastAPI) -> None:
         document["components"]["securitySchemes"] = {"token": _BEARER}
         # The empty one: a server that listens on its own machine only requires no token.
         document["security"] = [{"token": []}, {}]
-        _add_links(document)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]
@@ -172,41 +148,3 @@ def policy_of(page: bytes) -> str:
     return security_policy(
         script_src=" ".join(["'self'", *hashes]), style_src="'self' 'unsafe-inline'"
     )
-
-
-def _add_links(document: dict[str, Any]) -> None:
-    for source, parameters in _SOURCES.items():
-        _, operation = _operations(document)[source]
-        links = dict(_links(document, source, parameters))
-        for status, response in operation["responses"].items():
-            if status.startswith("2"):
-                response["links"] = links
-
-
-def _links(
-    document: dict[str, Any], source: str, parameters: dict[str, str]
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    for name, (path, operation) in _operations(document).items():
-        path_names = set(_PARAMETER.findall(path))
-        only = _ONLY.get(source)
-        if not path_names or not path_names <= set(parameters):
-            continue
-        if only is not None and name not in only:
-            continue
-        yield (
-            name,
-            {
-                "operationId": name,
-                "description": operation["summary"],
-                "parameters": {key: parameters[key] for key in sorted(path_names)},
-            },
-        )
-
-
-def _operations(document: dict[str, Any]) -> dict[str, tuple[str, dict[str, Any]]]:
-    """Return path and operation by id."""
-    return {
-        operation["operationId"]: (path, operation)
-        for path, methods in document["paths"].items()
-        for operation in methods.values()
-    }

@@ -7,7 +7,7 @@ import json
 from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Final
 
 import anyio
@@ -17,7 +17,7 @@ from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
 from starlette.types import Receive, Scope, Send
 
 from gaitswarm.operations import LARGEST_INDEX, EventsQuery
-from gaitswarm.services.monitoring.metrics import Metrics, OpenStream
+from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
@@ -97,13 +97,6 @@ class News:
         return format_sse_event(event="state", data_str=text)
 
 
-_Waiters = dict[asyncio.Future[News | None], None]
-"""Streams that wait for the same result; None tells them that the server stops."""
-
-_Question = tuple[int, int | None]
-"""A version of the topic, and the index after which iterations are read."""
-
-
 class Topic:
     """A job that streams follow. Bound to one event loop.
 
@@ -115,12 +108,11 @@ class Topic:
         self.streams = 0
         self._service = service
         self._job_id = job_id
-        self._idle: dict[int | None, _Waiters] = {}
-        self._reads: dict[_Question, _Waiters] = {}
-        self._tasks: set[asyncio.Task[News]] = set()
-        self._latest: tuple[_Question, News] | None = None
-        self._ended = False
         self._loop = asyncio.get_running_loop()
+        self._ended = self._loop.create_future()
+        # Of this version: its end, and reads by the index after which iterations are read.
+        self._changed = asyncio.Event()
+        self._reads: dict[int | None, asyncio.Task[News]] = {}
         self._timer = self._loop.call_later(_LONGEST_WAIT, self.advance)
         self._watch = ExitStack()
         changes = service.store.changes
@@ -137,22 +129,19 @@ class Topic:
             self._loop.call_soon_threadsafe(self.advance)
 
     def advance(self) -> None:
-        """Begin the next version, and read the job for waiting streams."""
+        """Begin the next version, and wake the streams that wait for it."""
         self._timer.cancel()
         self._timer = self._loop.call_later(_LONGEST_WAIT, self.advance)
         self.version += 1
-        idle, self._idle = self._idle, {}
-        for after, waiters in idle.items():
-            if waiters:
-                self._read(after, waiters)
+        self._reads = {}
+        self._changed.set()
+        self._changed = asyncio.Event()
 
     def end(self) -> None:
         """Return None to all waiting streams and to later ones."""
-        self._ended = True
-        for waiters in (*self._idle.values(), *self._reads.values()):
-            for waiter in waiters:
-                if not waiter.done():
-                    waiter.set_result(None)
+        if not self._ended.done():
+            self._ended.set_result(None)
+        self._changed.set()
 
     async def news(self, after: int | None, *, known: int | None = None) -> News | None:
         """Return the job and its iterations after an index; None when the server stops.
@@ -160,33 +149,17 @@ class Topic:
         known: the caller's version; waits until there is a later one. Streams with the same
         question share one read.
         """
-        if self._ended:
-            return None
-        question = (self.version, after)
-        if known == self.version:
-            waiters = self._idle.setdefault(after, {})
-        elif known is not None and self._latest is not None and self._latest[0] == question:
-            return self._latest[1]
-        elif question in self._reads:
-            waiters = self._reads[question]
-        else:
-            waiters = self._read(after, {})
-        waiter: asyncio.Future[News | None] = self._loop.create_future()
-        waiters[waiter] = None
-        try:
-            return await waiter
-        finally:
-            # Disconnected streams do not wait for the next change.
-            waiters.pop(waiter, None)
-
-    def _read(self, after: int | None, waiters: _Waiters) -> _Waiters:
-        """Begin to read for these streams, and for those that join until it is done."""
-        question = (self.version, after)
-        self._reads[question] = waiters
-        task = asyncio.ensure_future(run_sync(self._look, self.version, after))
-        self._tasks.add(task)
-        task.add_done_callback(partial(self._read_is_done, question))
-        return waiters
+        if known == self.version and not self._ended.done():
+            await self._changed.wait()
+        read = self._reads.get(after)
+        # A read that has ended is news for streams that knew an earlier version, unless it failed.
+        if read is None or (read.done() and (known is None or read.exception() is not None)):
+            read = asyncio.create_task(run_sync(self._look, self.version, after))
+            # Streams may be gone before it fails.
+            read.add_done_callback(lambda task: task.cancelled() or task.exception())
+            self._reads[after] = read
+        await asyncio.wait([read, self._ended], return_when=asyncio.FIRST_COMPLETED)
+        return None if self._ended.done() else read.result()
 
     def _look(self, version: int, after: int | None) -> News:
         job = self._service.job(self._job_id)
@@ -194,23 +167,6 @@ class Topic:
             return News(version, job, ())
         page = self._service.store.iterations(self._job_id, after=after, limit=PAGE)
         return News(version, job, page.items)
-
-    def _read_is_done(self, question: _Question, task: asyncio.Task[News]) -> None:
-        self._tasks.discard(task)
-        waiters = self._reads.pop(question)
-        if task.cancelled():
-            # The loop is ending.
-            return
-        if task.exception() is None and question[0] == self.version:
-            self._latest = question, task.result()
-        failed = task.exception()
-        for waiter in waiters:
-            if waiter.done():
-                continue
-            if failed is None:
-                waiter.set_result(task.result())
-            else:
-                waiter.set_exception(failed)
 
 
 class Topics:
@@ -253,7 +209,6 @@ class EventStream(StreamingResponse):
         super().__init__(self._texts, headers=_HEADERS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
         try:
             await super().__call__(scope, receive, send)
         finally:
@@ -308,51 +263,39 @@ async def job_events(
     state, after `query.limit` iterations, when the server stops, when the job is deleted, or after
     the committed iterations unless `query.follow`.
     """
-    with followed as topic, metrics.open_stream() as stream:
-        async for text in _events(topic, job_id, stream, query, stopping, pause_seconds):
-            yield text
-
-
-async def _events(
-    topic: Topic,
-    job_id: str,
-    stream: OpenStream,
-    query: EventsQuery,
-    stopping: asyncio.Event,
-    pause_seconds: float,
-) -> AsyncGenerator[bytes, None]:
     after = query.after
     sent_state: tuple[JobState, str | None] | None = None
     version: int | None = None
     left = LARGEST_INDEX if query.limit is None else query.limit
-    while not stopping.is_set():
-        try:
-            news = await topic.news(after, known=version)
-        except StoreUnavailable:
-            # Committed iterations will still be there when the database is back.
-            version = None
-            with anyio.move_on_after(pause_seconds):
-                await stopping.wait()
-            continue
-        except NotFound:
-            yield format_sse_event(event="deleted", data_str=json.dumps({"id": job_id}))
-            return
-        if news is None:
-            break
-        sent = news.iterations[:left]
-        texts = list(news.events[:left])
-        left -= len(sent)
-        for iteration in sent:
-            after = iteration.index
-            stream.sent(iteration.committed_at)
-        caught_up = left > 0 and len(news.iterations) < PAGE
-        job = news.job
-        if caught_up and (job.state, job.waiting) != sent_state:
-            sent_state = (job.state, job.waiting)
-            texts.append(news.state)
-        if texts:
-            yield b"".join(texts)
-        if left == 0 or (caught_up and (job.state.terminal or not query.follow)):
-            return
-        version = news.version if caught_up else None
-    yield format_sse_event(comment="the server is stopping", retry=_RECONNECT)
+    with followed as topic, metrics.open_stream() as stream:
+        while not stopping.is_set():
+            try:
+                news = await topic.news(after, known=version)
+            except StoreUnavailable:
+                # Committed iterations will still be there when the database is back.
+                version = None
+                with anyio.move_on_after(pause_seconds):
+                    await stopping.wait()
+                continue
+            except NotFound:
+                yield format_sse_event(event="deleted", data_str=json.dumps({"id": job_id}))
+                return
+            if news is None:
+                break
+            sent = news.iterations[:left]
+            texts = list(news.events[:left])
+            left -= len(sent)
+            for iteration in sent:
+                after = iteration.index
+                stream.sent(iteration.committed_at)
+            caught_up = left > 0 and len(news.iterations) < PAGE
+            job = news.job
+            if caught_up and (job.state, job.waiting) != sent_state:
+                sent_state = (job.state, job.waiting)
+                texts.append(news.state)
+            if texts:
+                yield b"".join(texts)
+            if left == 0 or (caught_up and (job.state.terminal or not query.follow)):
+                return
+            version = news.version if caught_up else None
+        yield format_sse_event(comment="the server is stopping", retry=_RECONNECT)

@@ -1,21 +1,23 @@
-"""ASGI middleware of every request: id, metrics, host and origin checks, body limit, headers."""
+"""ASGI middleware of every request: id, metrics and headers, host and origin, body limit."""
 
 from __future__ import annotations
 
 import logging
 import re
+import socket
 import time
 import uuid
 from collections.abc import Mapping, Sequence
+from ipaddress import ip_address
 from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gaitswarm.api.problems import internal_error, problem
-from gaitswarm.services.monitoring.hosts import HostNames
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.errors import GaitswarmError
 from gaitswarm.services.optimizer.log_context import log_context
@@ -39,176 +41,6 @@ _DRAINED: Final = 32
 resets it, and the client would not see the answer."""
 
 
-class RequestIdMiddleware:
-    """Set X-Request-ID on every response and answer unexpected exceptions.
-
-    A client's own id is kept if it has 1 to 128 letters, digits, `_`, `.` or `-`.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        given = Headers(scope=scope).get(REQUEST_ID, "")
-        request_id = given if _ACCEPTABLE_ID.match(given) else uuid.uuid4().hex
-        started = False
-
-        async def send_with_id(message: Message) -> None:
-            nonlocal started
-            if message["type"] == "http.response.start":
-                started = True
-                MutableHeaders(scope=message)[REQUEST_ID] = request_id
-            await send(message)
-
-        with log_context(request=request_id):
-            try:
-                await self.app(scope, receive, send_with_id)
-            except Exception as error:
-                what = f"{scope['method']} {scope['path']!r} (request {request_id})"
-                # Starlette wraps errors that are raised after the response has started.
-                cause = error if isinstance(error, GaitswarmError) else error.__cause__
-                if started and isinstance(cause, GaitswarmError):
-                    _log.error("%s: response aborted: %s", what, cause)
-                    return
-                _log.exception(what)
-                if started:
-                    raise
-                response = internal_error(scope["path"], request_id)
-                await response(scope, receive, send_with_id)
-
-
-class MetricsMiddleware:
-    """Count and time requests by method, route template and status."""
-
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self.app = app
-        self._metrics = metrics
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        started = time.perf_counter()
-
-        async def send_counted(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                self._count(scope, message["status"], time.perf_counter() - started)
-            await send(message)
-
-        await self.app(scope, receive, send_counted)
-
-    def _count(self, scope: Scope, status: int, seconds: float) -> None:
-        method = scope["method"] if scope["method"] in _METHODS else "other"
-        route = getattr(scope.get("route"), "path", None) or _NO_ROUTE
-        self._metrics.http_requests.labels(method, route, str(status)).inc()
-        self._metrics.http_seconds.labels(method, route).observe(seconds)
-
-
-class HostMiddleware:
-    """Reject requests whose Host is not a name of this server (DNS rebinding)."""
-
-    def __init__(self, app: ASGIApp, names: HostNames) -> None:
-        self.app = app
-        self.names = names
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
-        host = Headers(scope=scope).get("host") if scope["type"] == "http" else None
-        refusal = self.names.refusal(host)
-        if refusal is not None:
-            response = problem(scope["path"], "unknown-host", refusal)
-            await response(scope, receive, send)
-            return
-        await self.app(scope, receive, send)
-
-
-class SameOriginMiddleware:
-    """Reject state-changing requests from pages of other origins.
-
-    Decided by Origin and Sec-Fetch-Site, which browsers send and scripts cannot forge; other
-    clients send neither.
-    """
-
-    def __init__(self, app: ASGIApp, allowed: Sequence[str]) -> None:
-        self.app = app
-        self.allowed = frozenset(name.lower() for name in allowed)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
-        if scope["type"] == "http" and scope["method"] not in _SAFE_METHODS:
-            headers = Headers(scope=scope)
-            if not self._is_same_origin(headers):
-                detail = "requests from pages of another origin are not allowed; use this"
-                response = problem(scope["path"], "cross-origin", f"{detail} server's page")
-                await response(scope, receive, send)
-                return
-        await self.app(scope, receive, send)
-
-    def _is_same_origin(self, headers: Headers) -> bool:
-        origin = headers.get("origin")
-        if origin is None:
-            return headers.get("sec-fetch-site", "none") in _SAME_SITE
-        # Behind a TLS proxy the scheme differs from the server's.
-        host = urlsplit(origin.lower()).netloc
-        return bool(host) and (host == headers.get("host", "").lower() or host in self.allowed)
-
-
-class BodyLimitMiddleware:
-    """Reject bodies over a limit, whether or not their length was declared.
-
-    larger: limits of single paths [B].
-    """
-
-    def __init__(
-        self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int] | None = None
-    ) -> None:
-        self.app = app
-        self.max_bytes = max_bytes
-        self.larger = larger or {}
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        path = scope["path"].removeprefix(scope.get("root_path", ""))
-        limit = max(self.max_bytes, self.larger.get(path, 0))
-        length = Headers(scope=scope).get("content-length", "")
-        if length.isdecimal() and int(length) > limit:
-            await self._drain(receive, 0, limit)
-            advice = "a job spec has a few kilobytes"
-            if limit > self.max_bytes:
-                advice = "leave out cycles, or raise GAITSWARM_API_MAX_LOG_BYTES on the server"
-            detail = f"the body is larger than {limit} bytes; {advice}"
-            response = problem(scope["path"], "body-too-large", detail)
-            await response(scope, receive, send)
-            return
-        received = 0
-
-        async def receive_limited() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
-            if received > limit:
-                await self._drain(receive, received, limit)
-                raise HTTPException(413)
-            return message
-
-        await self.app(scope, receive_limited, send)
-
-    async def _drain(self, receive: Receive, received: int, limit: int) -> None:
-        more = True
-        while more and received < _DRAINED * limit:
-            message = await receive()
-            received += len(message.get("body", b""))
-            more = message.get("more_body", False)
-
-
 def security_policy(*, script_src: str = "'self'", style_src: str = "'self'") -> str:
     """Return a content security policy: this server's files and data only, no frames."""
     return (
@@ -225,20 +57,144 @@ _HEADERS: Final = {
 }
 
 
-class SecurityHeadersMiddleware:
-    """Set security headers on every response that does not set them itself."""
+class ResponseMiddleware:
+    """Finish every response: request id, security headers, metrics, and unexpected exceptions.
 
-    def __init__(self, app: ASGIApp) -> None:
+    A client's own id is kept if it has 1 to 128 letters, digits, `_`, `.` or `-`.
+    """
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app = app
+        self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one ASGI exchange."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get(REQUEST_ID, "")
+        request_id = given if _ACCEPTABLE_ID.match(given) else uuid.uuid4().hex
+        received_at = time.perf_counter()
+        started = False
 
-        async def send_with_headers(message: Message) -> None:
+        async def send_finished(message: Message) -> None:
+            nonlocal started
             if message["type"] == "http.response.start":
+                started = True
                 headers = MutableHeaders(scope=message)
+                headers[REQUEST_ID] = request_id
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
+                self._count(scope, message["status"], time.perf_counter() - received_at)
             await send(message)
 
-        await self.app(scope, receive, send_with_headers)
+        with log_context(request=request_id):
+            try:
+                await self.app(scope, receive, send_finished)
+            except Exception as error:
+                what = f"{scope['method']} {scope['path']!r} (request {request_id})"
+                # Starlette wraps errors that are raised after the response has started.
+                cause = error if isinstance(error, GaitswarmError) else error.__cause__
+                if started and isinstance(cause, GaitswarmError):
+                    _log.error("%s: response aborted: %s", what, cause)
+                    return
+                _log.exception(what)
+                if started:
+                    raise
+                response = internal_error(scope["path"], request_id)
+                await response(scope, receive, send_finished)
+
+    def _count(self, scope: Scope, status: int, seconds: float) -> None:
+        method = scope["method"] if scope["method"] in _METHODS else "other"
+        route = getattr(scope.get("route"), "path", None) or _NO_ROUTE
+        self._metrics.http_requests.labels(method, route, str(status)).inc()
+        self._metrics.http_seconds.labels(method, route).observe(seconds)
+
+
+class OriginMiddleware:
+    """Reject requests that browsers send on behalf of other sites.
+
+    A page of another site can make its name resolve to this server's address (DNS rebinding), but
+    its browser sends that name as Host; addresses cannot be rebound. State-changing requests must
+    come from this server's pages, by Origin and Sec-Fetch-Site, which scripts cannot forge. Other
+    clients send neither.
+    """
+
+    def __init__(self, app: ASGIApp, host: str, allowed: Sequence[str]) -> None:
+        self.app = app
+        self._allowed = frozenset(map(str.lower, allowed))
+        names = ("localhost", host.lower(), socket.gethostname().lower())
+        self._names = self._allowed.union(names)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        refusal = self._refusal(scope) if scope["type"] == "http" else None
+        await (refusal or self.app)(scope, receive, send)
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        headers = Headers(scope=scope)
+        host = headers.get("host")
+        if host is not None and not self._is_own(host.lower()):
+            detail = (
+                f"unknown host name {host!r}; to allow it, add it to the server's"
+                " GAITSWARM_API_ALLOWED_HOSTS"
+            )
+            return problem(scope["path"], "unknown-host", detail)
+        if scope["method"] not in _SAFE_METHODS and not self._is_same_origin(headers):
+            detail = "requests from pages of another origin are not allowed; use this server's page"
+            return problem(scope["path"], "cross-origin", detail)
+        return None
+
+    def _is_own(self, host: str) -> bool:
+        name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
+        if not self._names.isdisjoint((host, name)):
+            return True
+        try:
+            ip_address(name)
+        except ValueError:
+            return False
+        return True
+
+    def _is_same_origin(self, headers: Headers) -> bool:
+        origin = headers.get("origin")
+        if origin is None:
+            return headers.get("sec-fetch-site", "none") in _SAME_SITE
+        # Behind a TLS proxy the scheme differs from the server's.
+        host = urlsplit(origin.lower()).netloc
+        return bool(host) and (host == headers.get("host", "").lower() or host in self._allowed)
+
+
+class BodyLimitMiddleware:
+    """Reject bodies over a limit, whether or not their length was declared.
+
+    larger: limits of single paths [B].
+    """
+
+    def __init__(self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int]) -> None:
+        self.app = app
+        self.max_bytes = max_bytes
+        self.larger = larger
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        path = scope["path"].removeprefix(scope.get("root_path", ""))
+        limit = max(self.max_bytes, self.larger.get(path, 0))
+        declared = Headers(scope=scope).get("content-length", "")
+        is_too_large = declared.isdecimal() and int(declared) > limit
+        received = 0
+
+        async def receive_limited() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            if received <= limit and not is_too_large:
+                return message
+            while message.get("more_body", False) and received < _DRAINED * limit:
+                message = await receive()
+                received += len(message.get("body", b""))
+            advice = "a job spec has a few kilobytes"
+            if limit > self.max_bytes:
+                advice = "leave out cycles, or raise GAITSWARM_API_MAX_LOG_BYTES on the server"
+            raise HTTPException(413, f"the body is larger than {limit} bytes; {advice}")
+
+        await self.app(scope, receive_limited, send)

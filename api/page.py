@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import mimetypes
 import re
-from html import escape
-from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -43,19 +41,6 @@ _NO_MANUAL: Final = (
     "this server has no manual; run `make manual` in a checkout of gaitswarm, or read"
     " docs/index.md there"
 )
-
-_NO_MANUAL_PAGE: Final = """<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width">
-<title>gaitswarm: no manual</title>
-<h1>This server has no manual</h1>
-<p>In a checkout of gaitswarm, <code>make manual</code> builds it, and the server serves it without
-a restart. Wheels of <code>make wheel</code> and the image include it.</p>
-<p>The same pages exist as Markdown: begin with <code>docs/index.md</code> of the checkout.</p>
-<p><a href="{root}/docs">Every server documents its API.</a></p>
-</html>
-"""
 
 
 def is_built(folder: Path = PAGE_FOLDER) -> bool:
@@ -116,16 +101,14 @@ def add_manual(app: FastAPI, folder: Path) -> None:
     """Serve the manual."""
     app.state.manual_folder = folder
 
-    def index(request: Request) -> Response:
-        if not _has_manual(folder):
-            return _no_manual(request)
-        root = request.scope.get("root_path", "")
-        return RedirectResponse(f"{root}/manual/{_MANUAL_INDEX}")
-
     def page(request: Request) -> Response:
+        name = request.path_params.get("path", "")
         if not _has_manual(folder):
-            return _no_manual(request)
-        path = _file(folder, request.path_params["path"])
+            return problem(request.url.path, "not-found", _NO_MANUAL)
+        if not name:
+            base = request.scope.get("root_path", "")
+            return RedirectResponse(f"{base}/manual/{_MANUAL_INDEX}")
+        path = _file(folder, name)
         if path is None:
             detail = "the manual has no such page; begin at /manual"
             return problem(request.url.path, "not-found", detail)
@@ -134,18 +117,8 @@ def add_manual(app: FastAPI, folder: Path) -> None:
         text = path.read_bytes()
         return HTMLResponse(text, headers={"Content-Security-Policy": policy_of(text), **_NO_CACHE})
 
-    app.add_route("/manual", index, include_in_schema=False)
-    app.add_route("/manual/", index, include_in_schema=False)
+    app.add_route("/manual", page, include_in_schema=False)
     app.add_route("/manual/{path:path}", page, include_in_schema=False)
-
-
-def _no_manual(request: Request) -> Response:
-    """Return a page for browsers, a problem for programs."""
-    headers = {"Vary": "Accept", **_NO_CACHE}
-    if "text/html" not in request.headers.get("accept", ""):
-        return problem(request.url.path, "not-found", _NO_MANUAL, headers=headers)
-    text = _NO_MANUAL_PAGE.format(root=escape(request.scope.get("root_path", "")))
-    return HTMLResponse(text, HTTPStatus.NOT_FOUND, headers)
 
 
 def _has_manual(folder: Path) -> bool:

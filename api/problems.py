@@ -1,26 +1,4 @@
-"""Errors as problem+json (RFC 9457): the mapping of exceptions to responses.
-
-| raised                                        | status | type                  |
-| --------------------------------------------- | ------ | --------------------- |
-| RequestValidationError, body is not JSON      | 400    | malformed-json        |
-| RequestValidationError, InvalidRequest,       | 422    | invalid-request       |
-| SimulationInputError                          |        |                       |
-| Unauthorized                                  | 401    | unauthorized          |
-| Forbidden                                     | 403    | forbidden             |
-| change requested by a page of another origin  | 403    | cross-origin          |
-| NotFound; no such route                       | 404    | not-found             |
-| Conflict, LeaseLost                           | 409    | conflict              |
-| IdempotencyConflict                           | 409    | idempotency-conflict  |
-| QuotaExceeded                                 | 409    | quota-exceeded        |
-| Unreadable                                    | 409    | unreadable            |
-| body over the limit                           | 413    | body-too-large        |
-| Host that is not a name of the server         | 421    | unknown-host          |
-| TooManyRequests; too many invalid tokens      | 429    | too-many-requests     |
-| StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
-| SimulationError                               |        |                       |
-| /v1/readyz of a server that shuts down        | 503    | draining              |
-| anything else                                 | 500    | internal-error        |
-"""
+"""Errors as problem+json (RFC 9457): the mapping of exceptions to responses."""
 
 from __future__ import annotations
 
@@ -118,7 +96,7 @@ _HTTP: Final = {
     ),
     404: ("not-found", "no resource has this path; see /docs"),
     405: ("method-not-allowed", "use a method of the Allow header; see /docs"),
-    413: ("body-too-large", "send a smaller body; a job spec has a few kilobytes"),
+    413: ("body-too-large", None),
 }
 """Types and details of errors that the framework raises."""
 
@@ -220,13 +198,13 @@ async def domain_problem(request: Request, error: Exception) -> Response:
 
 async def _on_http_error(request: Request, raised: Exception) -> Response:
     error = cast(HTTPException, raised)
-    default = (f"http-{error.status_code}", str(error.detail))
-    kind, advice = _HTTP.get(error.status_code, default)
+    kind, advice = _HTTP.get(error.status_code, (f"http-{error.status_code}", None))
     headers = error.headers
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
         # Starlette names the methods of the first route of a path alone.
         headers = {"Allow": ", ".join(_methods(request))}
-    return problem(request.url.path, kind, advice, status=error.status_code, headers=headers)
+    detail = advice or str(error.detail)
+    return problem(request.url.path, kind, detail, status=error.status_code, headers=headers)
 
 
 def _methods(request: Request) -> list[str]:

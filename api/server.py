@@ -1,17 +1,31 @@
-"""The HTTP server: uvicorn in one process, with draining at shutdown."""
+"""HTTP servers: the API with draining at shutdown, and the metrics of a process without it."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
 
+from gaitswarm.api.access import METRICS_PATH, AccessMiddleware, TokenGuesses
+from gaitswarm.api.app import metrics_route
+from gaitswarm.api.middleware import OriginMiddleware
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.settings import Settings
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store.tokens import Tokens
 
 _BACKLOG = 512
 
@@ -33,7 +47,6 @@ class ApiServer:
         drain: Drain = lambda _: None,
         log_level: str = "warning",
     ) -> None:
-        host = settings.api_host
         config = uvicorn.Config(
             app,
             lifespan="on",
@@ -49,17 +62,7 @@ class ApiServer:
             forwarded_allow_ips=list(settings.api_trusted_proxies),
         )
         self._server = _Server(config, drain)
-        ipv6 = ":" in host
-        self._socket = socket.create_server(
-            (host, settings.api_port),
-            family=socket.AF_INET6 if ipv6 else socket.AF_INET,
-            backlog=_BACKLOG,
-            dualstack_ipv6=ipv6 and socket.has_dualstack_ipv6(),
-        )
-        # Inherited by accepted connections; without it a body waits 40 ms for the client's ACK.
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        bound_host, bound_port = self._socket.getsockname()[:2]
-        self.url = f"http://{f'[{bound_host}]' if ipv6 else bound_host}:{bound_port}"
+        self._socket, self.url = _listen(settings.api_host, settings.api_port)
 
     def run(self) -> None:
         """Serve until `stop`, or until SIGINT or SIGTERM in the main thread.
@@ -76,6 +79,21 @@ class ApiServer:
     def stop(self) -> None:
         """Make `run` return soon. Thread-safe."""
         self._server.should_exit = True
+
+
+def _listen(host: str, port: int) -> tuple[socket.socket, str]:
+    """Return a listening socket and its base URL."""
+    ipv6 = ":" in host
+    listening = socket.create_server(
+        (host, port),
+        family=socket.AF_INET6 if ipv6 else socket.AF_INET,
+        backlog=_BACKLOG,
+        dualstack_ipv6=ipv6 and socket.has_dualstack_ipv6(),
+    )
+    # Inherited by accepted connections; without it a body waits 40 ms for the client's ACK.
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    bound_host, bound_port = listening.getsockname()[:2]
+    return listening, f"http://{f'[{bound_host}]' if ipv6 else bound_host}:{bound_port}"
 
 
 class _Server(uvicorn.Server):
@@ -104,3 +122,46 @@ class _Server(uvicorn.Server):
             self.force_exit = True
             self._at_once.set()
         self.should_exit = True
+
+
+@contextmanager
+def metrics_server(
+    metrics: Metrics,
+    tokens: Callable[[], Tokens],
+    settings: Settings,
+    trouble: Callable[[], str | None],
+) -> Iterator[str]:
+    """Serve metrics and a liveness probe of a process without an API, inside the block.
+
+    Yields the URL of the metrics.
+    """
+
+    def healthz(_request: Request) -> Response:
+        problem = trouble()
+        return PlainTextResponse(f"{problem or 'ok'}\n", 503 if problem else 200)
+
+    host = settings.metrics_host
+    app = Starlette(routes=[metrics_route(metrics), Route("/healthz", healthz)])
+    app.add_middleware(
+        AccessMiddleware,
+        tokens=tokens,
+        guesses=TokenGuesses(),
+        required=settings.metrics_need_token,
+    )
+    app.add_middleware(OriginMiddleware, host=host, allowed=settings.api_allowed_hosts)
+    try:
+        listening, url = _listen(host, settings.metrics_port or 0)
+    except OSError as error:
+        raise EvaluatorUnavailable(
+            f"cannot serve metrics: {error.strerror}; choose another GAITSWARM_METRICS_PORT"
+        ) from error
+    config = uvicorn.Config(app, lifespan="off", log_config=None, log_level="warning", ws="none")
+    server = uvicorn.Server(config)
+    with listening:
+        thread = threading.Thread(target=server.run, args=([listening],), name="metrics")
+        thread.start()
+        try:
+            yield url + METRICS_PATH
+        finally:
+            server.should_exit = True
+            thread.join()

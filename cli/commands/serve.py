@@ -6,7 +6,7 @@ import gc
 import logging
 import os
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -17,7 +17,7 @@ from gaitswarm.cli.inputs.options import RunnerOptions
 from gaitswarm.cli.output import note
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from gaitswarm.api.dependencies import Component
@@ -131,10 +131,14 @@ def runner(options: RunnerOptions) -> None:
         suppress(EvaluationStopped),
         stop_on_signals(stop, at_once),
         _runtime(settings, metrics, should_stop=stop.is_set) as opened,
-        _served(metrics, settings, opened) as url,
+        ExitStack() as stack,
     ):
         log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
-        if url is not None:
+        if metrics is not None and opened.runner is not None:
+            from gaitswarm.api.server import metrics_server
+
+            tokens, trouble = lambda: opened.service.store.tokens, opened.runner.trouble
+            url = stack.enter_context(metrics_server(metrics, tokens, settings, trouble))
             log.info("metrics: %s", url)
         # Handlers run in this thread, but the system may deliver a signal to another.
         while not stop.wait(_SIGNAL_POLL):
@@ -230,22 +234,3 @@ def _tracing() -> Tracing | None:
         )
         return None
     return exporting_tracing()
-
-
-@contextmanager
-def _served(metrics: Metrics | None, settings: Settings, opened: Runtime) -> Iterator[str | None]:
-    """Serve a runner's metrics and health if a port is set; yield the URL of the metrics."""
-    if metrics is None or settings.metrics_port is None:
-        yield None
-        return
-    from gaitswarm.services.monitoring.exposition import MetricsAccess, metrics_server
-    from gaitswarm.services.monitoring.hosts import HostNames
-
-    access = MetricsAccess(
-        lambda: opened.service.store.tokens, required=settings.metrics_need_token
-    )
-    host, port = settings.metrics_host, settings.metrics_port
-    names = HostNames(host, settings.api_allowed_hosts)
-    trouble = opened.runner.trouble if opened.runner is not None else lambda: None
-    with metrics_server(metrics, access, names=names, trouble=trouble, host=host, port=port) as url:
-        yield url

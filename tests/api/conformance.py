@@ -1,7 +1,7 @@
 """`python -m tests.api.conformance --cases 10000`: a server keeps to its own OpenAPI document.
 
 Every operation is sent values good and bad, made by schemathesis from the document, and sequences
-of operations follow the document's links. Nothing may be a 5xx, undocumented, or a traceback in
+of operations follow links from their answers. Nothing may be a 5xx, undocumented, or a traceback in
 the log.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import re
 import tempfile
 import time
 from collections import Counter
@@ -55,6 +56,28 @@ CHECKS: Final = [
     status_code_conformance,
     unsupported_method,
 ]
+
+_SOURCES: Final = {
+    "submit_job": {"job_id": "$response.body#/id"},
+    "fork_job": {"job_id": "$response.body#/id"},
+    "list_jobs": {"job_id": "$response.body#/items/0/id"},
+    "list_iterations": {
+        "job_id": "$request.path.job_id",
+        "iteration": "$response.body#/items/0/index",
+    },
+    "list_recordings": {"recording_id": "$response.body#/items/0/id"},
+    "add_recording": {"recording_id": "$response.body#/id"},
+    "record_measured_walk": {"recording_id": "$response.body#/recording/id"},
+}
+"""OpenAPI links: parameters of other operations that a response contains."""
+
+_ONLY: Final = {
+    "list_jobs": frozenset({"get_job", "list_iterations"}),
+    "list_iterations": frozenset({"list_evaluations", "get_preference_for"}),
+}
+"""Targets of links, if not every operation with one of the parameters in its path."""
+
+_PARAMETER: Final = re.compile(r"\{(\w+)\}")
 
 _STEPS: Final = 12
 """Requests of a sequence."""
@@ -147,6 +170,44 @@ def _jobs(store: Store, service: JobService) -> list[str]:
     return found
 
 
+def _add_links(document: dict[str, Any]) -> None:
+    for source, parameters in _SOURCES.items():
+        _, operation = _operations(document)[source]
+        links = dict(_links(document, source, parameters))
+        for status, response in operation["responses"].items():
+            if status.startswith("2"):
+                response["links"] = links
+
+
+def _links(
+    document: dict[str, Any], source: str, parameters: dict[str, str]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    for name, (path, operation) in _operations(document).items():
+        path_names = set(_PARAMETER.findall(path))
+        only = _ONLY.get(source)
+        if not path_names or not path_names <= set(parameters):
+            continue
+        if only is not None and name not in only:
+            continue
+        yield (
+            name,
+            {
+                "operationId": name,
+                "description": operation["summary"],
+                "parameters": {key: parameters[key] for key in sorted(path_names)},
+            },
+        )
+
+
+def _operations(document: dict[str, Any]) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return path and operation by id."""
+    return {
+        operation["operationId"]: (path, operation)
+        for path, methods in document["paths"].items()
+        for operation in methods.values()
+    }
+
+
 def schema_of(server: Server, ids: dict[str, list[str]]) -> BaseSchema:
     """The document of a server; half of all paths name something that there is.
 
@@ -155,6 +216,7 @@ def schema_of(server: Server, ids: dict[str, list[str]]) -> BaseSchema:
     """
     # Made at the first request, which takes long on a busy machine.
     document = server.client.get("/openapi.json", timeout=300.0).json()
+    _add_links(document)
     # Streams end with their jobs only, and are tested apart.
     schema = schemathesis.openapi.from_dict(document).exclude(operation_id="stream_events")
     good = _GOOD_JOB.model_dump(mode="json")
@@ -208,7 +270,7 @@ _SETTINGS: Final = hypothesis.settings(
 
 
 def sequences(schema: BaseSchema, url: str, found: Found, cases: int) -> None:
-    """Send sequences of requests along the links of the document.
+    """Send sequences of requests along links, from answers to the paths of other operations.
 
     Args:
         schema: of the server.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,24 +35,12 @@ def built(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["/manual", "/manual/", "/manual/docs/cli.html"])
-def test_a_program_learns_how_to_build_a_missing_manual(server: Server, path: str) -> None:
+def test_a_missing_manual_is_a_problem_that_says_how_to_build_it(server: Server, path: str) -> None:
     answer = server.client.get(path)
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
     assert "make manual" in answer.json()["detail"] and "docs/index.md" in answer.json()["detail"]
     assert server.client.get("/v1/session").json()["manual"] is False
-
-
-@pytest.mark.parametrize("path", ["/manual", "/manual/", "/manual/docs/cli.html"])
-def test_a_browser_gets_an_explanatory_page(server: Server, path: str) -> None:
-    accept = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
-    answer = server.client.get(path, headers={"Accept": accept})
-    assert answer.status_code == 404
-    assert answer.headers["content-type"].startswith("text/html")
-    assert answer.headers["vary"] == "Accept"
-    assert "make manual" in answer.text and "docs/index.md" in answer.text
-    (link,) = re.findall('href="([^"]+)"', answer.text)
-    assert server.client.get(link).status_code == 200
 
 
 def test_its_first_page_is_at_manual_and_its_own_inline_scripts_alone_may_run(

@@ -5,6 +5,7 @@ Headers and signature follow Standard Webhooks (https://www.standardwebhooks.com
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import binascii
 import hashlib
@@ -14,6 +15,8 @@ import logging
 import threading
 import time
 from collections.abc import Collection
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, suppress
 from typing import TYPE_CHECKING, Final
 
 import httpx2
@@ -24,8 +27,11 @@ from gaitswarm.services.optimizer.jobs.notification import Notification, refused
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
 
-_TIMEOUT: Final = 10.0
-"""Of a receiver [s]."""
+_DEADLINE: Final = 10.0
+"""Longest attempt, from the connection to the response's headers [s]."""
+
+_AT_ONCE: Final = 32
+"""Attempts that are under way at the same time."""
 
 _LEASE_SECONDS: Final = 60.0
 """Longer than any attempt, unless its process died."""
@@ -57,15 +63,17 @@ def _key(secret: str) -> bytes:
 class Notifier:
     """Sends due notifications from its own thread, from start() to stop().
 
-    Several processes may run one: each notification is leased by one at a time. Delivery is at
-    least once; receivers detect repetitions by `webhook-id`.
+    Receivers do not wait for each other. Several processes may run one: each notification is
+    leased by one at a time. Delivery is at least once; receivers detect repetitions by
+    `webhook-id`.
     """
 
     def __init__(self, store: Store, hosts: Collection[str], secret: str | None) -> None:
         self._store = store
         self._hosts = hosts
         self._secret = secret
-        self._stop = threading.Event()
+        self._loop = asyncio.new_event_loop()
+        self._stop = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="notifier", daemon=True)
 
     def start(self) -> None:
@@ -73,37 +81,62 @@ class Notifier:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the current attempt. Idempotent."""
-        self._stop.set()
-        self._thread.join()
+        """Abandon current attempts, which are repeated when their leases end. Idempotent."""
+        if self._thread.is_alive():
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._stop.set)
+            self._thread.join()
 
     def _run(self) -> None:
+        # A slow lookup of a host's address occupies a thread of the executor.
+        self._loop.set_default_executor(ThreadPoolExecutor(_AT_ONCE + 1, "notifier"))
+        with closing(self._loop):
+            self._loop.run_until_complete(self._send())
+
+    async def _send(self) -> None:
+        stopped = asyncio.create_task(self._stop.wait())
+        attempts: set[asyncio.Task[None]] = set()
         # Ignore proxies and credentials in the environment.
-        with httpx2.Client(timeout=_TIMEOUT, follow_redirects=False, trust_env=False) as client:
+        async with httpx2.AsyncClient(
+            timeout=None, follow_redirects=False, trust_env=False
+        ) as client:
             while not self._stop.is_set():
+                pause = _POLL_SECONDS
                 try:
-                    pause = 0.0 if self._send_next(client) else _POLL_SECONDS
+                    due = await self._next() if len(attempts) < _AT_ONCE else None
                 except StoreUnavailable as error:
                     _log.warning("cannot send notifications: %s", error)
-                    pause = _STORE_PAUSE
-                except Exception:  # noqa: BLE001 - one notification must not block the others
-                    _log.exception("cannot send a notification")
-                    pause = _STORE_PAUSE
-                self._stop.wait(pause)
+                    due, pause = None, _STORE_PAUSE
+                if due is not None:
+                    attempt = asyncio.create_task(self._attempt(client, due))
+                    attempts.add(attempt)
+                    attempt.add_done_callback(attempts.discard)
+                    continue
+                awaited = {stopped, *attempts}
+                await asyncio.wait(awaited, timeout=pause, return_when=asyncio.FIRST_COMPLETED)
+            for attempt in attempts:
+                attempt.cancel()
+            await asyncio.gather(*attempts, return_exceptions=True)
 
-    def _send_next(self, client: httpx2.Client) -> bool:
-        """Make one attempt, if any is due; return whether there was one."""
-        due = self._store.outbox.take(lease_seconds=_LEASE_SECONDS)
-        if due is None:
-            return False
-        refused = refused_url(due.url, self._hosts)
-        error = refused or self._post(client, due)
-        self._store.outbox.settle(due, error, final=refused is not None)
+    async def _next(self) -> Notification | None:
+        return await asyncio.to_thread(self._store.outbox.take, lease_seconds=_LEASE_SECONDS)
+
+    async def _attempt(self, client: httpx2.AsyncClient, due: Notification) -> None:
+        """Make one attempt and record its result."""
+        try:
+            refused = refused_url(due.url, self._hosts)
+            error = refused or await self._post(client, due)
+            settle = self._store.outbox.settle
+            await asyncio.to_thread(settle, due, error, final=refused is not None)
+        except StoreUnavailable as failure:
+            error = f"cannot be recorded: {failure}"
+        except Exception:  # noqa: BLE001 - one notification must not block the others
+            _log.exception("cannot send notification %s", due.id)
+            return
         if error is not None:
             _log.warning("job %s: notification %s: %s", due.job_id, due.id, error)
-        return True
 
-    def _post(self, client: httpx2.Client, due: Notification) -> str | None:
+    async def _post(self, client: httpx2.AsyncClient, due: Notification) -> str | None:
         """Return the error, for people; None on success."""
         body = json.dumps(due.document, separators=(",", ":")).encode()
         now = int(time.time())
@@ -117,8 +150,13 @@ class Notifier:
             headers["webhook-signature"] = signature(self._secret, due.id, now, body)
         try:
             # The response's body, of unknown size, is not read.
-            with client.stream("POST", due.url, content=body, headers=headers) as answer:
+            async with (
+                asyncio.timeout(_DEADLINE),
+                client.stream("POST", due.url, content=body, headers=headers) as answer,
+            ):
                 status = answer.status_code
+        except TimeoutError:
+            return f"the receiver did not answer within {_DEADLINE:g} s"
         except (httpx2.HTTPError, httpx2.InvalidURL) as error:
             return f"sending failed: {type(error).__name__}"
         return None if 200 <= status < 300 else f"the receiver answered {status}"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -55,4 +56,32 @@ def receiving() -> Iterator[Receiver]:
             yield receiver
         finally:
             server.shutdown()
+            thread.join()
+
+
+@contextmanager
+def answering_endlessly() -> Iterator[str]:
+    """Yield the URL of a receiver that sends a byte of a header every 50 ms, and never all."""
+    stop = threading.Event()
+
+    def answer(connection: socket.socket) -> None:
+        with connection, suppress(OSError):
+            connection.sendall(b"HTTP/1.1 204 No Content\r\nX-Endless: ")
+            while not stop.wait(0.05):
+                connection.sendall(b"a")
+
+    def accept(listener: socket.socket) -> None:
+        with suppress(OSError):
+            while True:
+                connection, _ = listener.accept()
+                threading.Thread(target=answer, args=(connection,), daemon=True).start()
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        thread = threading.Thread(target=accept, args=(listener,), daemon=True)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}/"
+        finally:
+            stop.set()
+            listener.shutdown(socket.SHUT_RDWR)
             thread.join()

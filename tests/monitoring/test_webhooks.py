@@ -6,10 +6,12 @@ import base64
 import hashlib
 import hmac
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -24,7 +26,7 @@ from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually
 from tests.examples.servers import Server
-from tests.monitoring.receiver import Receiver, receiving
+from tests.monitoring.receiver import Receiver, answering_endlessly, receiving
 from tests.optimizer.formula import SPEC
 from tests.store.examples import Clock
 
@@ -116,6 +118,36 @@ def test_failed_deliveries_are_repeated_with_the_same_id_and_redirections_are_no
     assert first == second
     assert store.outbox.about(job_id)[0].attempts == 2
     store.close()
+
+
+def test_a_receiver_that_answers_endlessly_delays_neither_others_nor_the_stop(
+    store: Store, receiver: Receiver
+) -> None:
+    with answering_endlessly() as endless:
+        slow = cancelled(store, endless)
+        hosts = (receiver.host, urlsplit(endless).netloc)
+        with notifying(store, receiver, hosts=hosts):
+            leased = store.outbox.about(slow)[0].next_attempt_at
+            eventually(lambda: store.outbox.about(slow)[0].next_attempt_at != leased)
+            prompt = cancelled(store, receiver.url)
+            eventually(lambda: store.outbox.about(prompt)[0].delivered_at is not None)
+            stopped = time.monotonic()
+        assert time.monotonic() - stopped < 5.0
+        # The attempt was abandoned, and is repeated when its lease ends.
+        assert store.outbox.about(slow)[0].attempts == 0
+
+
+def test_an_attempt_ends_at_its_deadline_however_slowly_the_receiver_answers(
+    store: Store, receiver: Receiver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gaitswarm.services.monitoring.webhooks._DEADLINE", 0.5)
+    with answering_endlessly() as endless:
+        slow = cancelled(store, endless)
+        with notifying(store, receiver, hosts=(urlsplit(endless).netloc,)):
+            eventually(lambda: store.outbox.about(slow)[0].attempts == 1)
+    (waiting,) = store.outbox.about(slow)
+    assert waiting.error == "the receiver did not answer within 0.5 s"
+    assert waiting.next_attempt_at is not None
 
 
 def test_pauses_grow_to_an_hour_and_end() -> None:

@@ -29,6 +29,7 @@ from gaitswarm.sim.firmware import (
     check_table_bits,
     firmware_of,
 )
+from gaitswarm.sim.input import Line
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
@@ -63,7 +64,7 @@ class FirmwareOptions(TypedDict, total=False):
 class FirmwareRequest(ScenariosRequest):
     """A design and the scenarios whose trajectories and simulations its firmware includes."""
 
-    label: str = Field(default="design", max_length=200, description="Display name of the design.")
+    label: Line = Field(default="design", max_length=200, description="Display name of the design.")
     table_bits: tuple[int, int] | None = Field(
         default=None,
         description="Of the indices of angle error and current in a fuzzy controller's table, in"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
-from pydantic import BaseModel, Discriminator, Tag
+from pydantic import AfterValidator, BaseModel, Discriminator, Tag
 
 from gaitswarm.sim.near_names import instead_of, nearest
 
@@ -18,6 +18,25 @@ OWN: Final = "<own>"
 
 _KEY: Final = "[key]"
 """Appended by pydantic if the key of a dictionary is wrong, not its value."""
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must contain only printable characters")
+    return text
+
+
+def _printable_lines(text: str) -> str:
+    for line in text.replace("\r\n", "\n").replace("\t", " ").split("\n"):
+        _printable(line)
+    return text
+
+
+Line = Annotated[str, AfterValidator(_printable)]
+"""Text that a terminal or a log prints as it is."""
+
+Lines = Annotated[str, AfterValidator(_printable_lines)]
+"""The same with line breaks and tabs."""
 
 
 def alternatives(

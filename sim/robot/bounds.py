@@ -13,6 +13,7 @@ from xml.parsers import expat
 from pydantic import AfterValidator, Field
 
 from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.input import Line
 
 LONGEST_TOML: Final = 200_000
 """Characters of a robot.toml."""
@@ -74,21 +75,13 @@ def _in_size(value: float) -> float:
     return value
 
 
-def _printable(name: str) -> str:
-    if not name.isprintable():
-        raise ValueError("must contain only printable characters")
-    return name
-
-
 Number = Annotated[float, AfterValidator(_in_size)]
 """A number of a robot.toml, within the allowed magnitudes."""
 
-PartName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_printable)]
+PartName = Annotated[Line, Field(min_length=1, max_length=LONGEST_NAME)]
 """Name of a part of a robot."""
 
-Sentence = Annotated[
-    str, Field(min_length=1, max_length=LONGEST_ATTRIBUTE), AfterValidator(_printable)
-]
+Sentence = Annotated[Line, Field(min_length=1, max_length=LONGEST_ATTRIBUTE)]
 """A sentence about a robot for users."""
 
 

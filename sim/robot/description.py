@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
+from gaitswarm.sim.input import Lines
 from gaitswarm.sim.robot.actuators import (
     CONTROL_RATE,
     LARGEST_OUTPUT,
@@ -170,7 +171,7 @@ class RobotDescription(Data):
     """Everything about a robot that its URDF does not contain."""
 
     name: PartName
-    description: str = Field(default="", max_length=2000)
+    description: Lines = Field(default="", max_length=2000)
     load_height: Number = Field(description="height of a load above the body's centre [m]")
     contact_law: ContactLaw = Field(default="linear_zone", description="friction law of all feet")
     planned_soles: PlannedSoles = Field(

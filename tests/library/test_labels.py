@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 import gaitswarm
@@ -34,6 +36,22 @@ def test_labels_that_are_too_long_are_refused(reach: Reach, finished: Finished) 
     assert refused.value.field == "name"
     with pytest.raises(gaitswarm.NotFound):
         jobs.label("nowhere", note="x")
+
+
+@pytest.mark.parametrize(
+    ("label", "field"),
+    [({"name": "a\x1b[2J"}, "name"), ({"tags": ["a\0"]}, "tags.0"), ({"note": "\x9b2J"}, "note")],
+)
+def test_labels_that_a_terminal_does_not_print_are_refused(
+    reach: Reach, finished: Finished, label: dict[str, Any], field: str
+) -> None:
+    jobs = reach(finished.db)
+    with pytest.raises(gaitswarm.InvalidRequest, match="printable") as refused:
+        jobs.label(finished.id, **label)
+    assert refused.value.field == field
+    with pytest.raises(gaitswarm.InvalidRequest, match="printable"):
+        jobs.submit({"name": "a\u202eb"})
+    assert jobs.label(finished.id, note="Größe:\n\t1 µm\r\n").note == "Größe:\n\t1 µm\r\n"
 
 
 def test_the_terminal_writes_and_finds_them(finished: Finished) -> None:

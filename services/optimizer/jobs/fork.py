@@ -14,6 +14,7 @@ from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
+from gaitswarm.sim.input import Line
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import ScenarioChoice
 
@@ -35,7 +36,7 @@ class ForkRequest(BaseModel):
         " iterations 0 to `from_iteration` - 1.",
         examples=[10],
     )
-    name: Annotated[str, Field(max_length=200)] | None = Field(
+    name: Annotated[Line, Field(max_length=200)] | None = Field(
         default=None, description="Display name; null: the parent's."
     )
     preference: PreferenceChoice | None = Field(

@@ -13,14 +13,15 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.sim.input import Line, Lines
 from gaitswarm.sim.robot.variant import SHIPPED
 
 OWN: Final = "own"
 """Facet value of custom preferences and unnamed robots."""
 
-Tag = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
-JobName = Annotated[str, StringConstraints(max_length=200)]
-Note = Annotated[str, StringConstraints(max_length=10_000)]
+Tag = Annotated[Line, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
+JobName = Annotated[Line, StringConstraints(max_length=200)]
+Note = Annotated[Lines, StringConstraints(max_length=10_000)]
 
 
 class Labels(BaseModel):

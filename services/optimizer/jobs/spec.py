@@ -38,6 +38,7 @@ from gaitswarm.sim.assembly import check_precision
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.sim.input import Line
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
@@ -77,7 +78,7 @@ class Spec(BaseModel):
     """Whether designs have several objectives, returned by `search_feedback`."""
 
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
-    name: str = Field(default="", max_length=200, description="Display name; need not be unique.")
+    name: Line = Field(default="", max_length=200, description="Display name; need not be unique.")
     robot: RobotSource = Field(
         default=DEFAULT_ROBOT,
         description="Robot to simulate: a name, a variant with another friction law or with"

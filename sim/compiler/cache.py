@@ -131,9 +131,9 @@ def _mark_used(library: Path) -> None:
 
 
 def _directories() -> Iterator[Path]:
-    """Directories of libraries. Lazy: the private directory is checked only if needed."""
+    """Directories of libraries. Lazy: the temporary one is checked only if needed."""
     usual = _usual_directory()
-    if usual is not None:
+    if usual is not None and _is_private(usual):
         yield usual
     # Windows does not report the owner of a directory.
     if hasattr(os, "getuid") and _is_private(private := _private_directory()):
@@ -156,13 +156,15 @@ def _private_directory() -> Path:
 
 
 def _is_private(directory: Path) -> bool:
-    """Whether no other user can have put files into it: libraries loaded from it are executed."""
+    """Return whether no other user (but root) can have put libraries into it, which we execute."""
+    if not hasattr(os, "getuid"):
+        return True
     try:
         status = directory.lstat()
     except OSError:  # does not exist yet
         return True
-    mine = status.st_uid == os.getuid() and not status.st_mode & 0o022
-    return mine and stat.S_ISDIR(status.st_mode)
+    mine = status.st_uid in (os.getuid(), 0) and not status.st_mode & 0o022
+    return mine and not stat.S_ISLNK(status.st_mode)
 
 
 def _writable_directory() -> Path:
@@ -174,11 +176,14 @@ def _writable_directory() -> Path:
                 return directory
         except OSError as error:
             refused = error
-    private = _private_directory()
-    reason = "writable" if _is_private(private) else "private to this user"
+    lacks = [
+        f"{directory} is not {'writable' if _is_private(directory) else 'private to this user'}"
+        for directory in (_usual_directory(), _private_directory())
+        if directory is not None
+    ]
     raise KernelBuildError(
-        f"{_usual_directory()} is not writable and {private} is not {reason}; set XDG_CACHE_HOME to"
-        " a writable directory"
+        f"{' and '.join(lacks)}; set XDG_CACHE_HOME to a writable directory, whose gaitswarm/ no"
+        " other user can write"
     ) from refused
 
 

@@ -339,6 +339,17 @@ def test_a_foreign_private_directory_matters_only_where_the_usual_one_cannot_be_
     assert not list(private.glob("answer-*"))
 
 
+@pytest.mark.parametrize("planted", [open_to_all, linked_elsewhere])
+def test_no_library_is_loaded_from_a_directory_that_others_can_write(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted: Callable[[Path], None]
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+    (tmp_path / "tmp").mkdir()
+    planted(cache)
+    built(tmp_path / "tmp" / f"gaitswarm-{os.getuid()}")
+    assert not list(cache.glob("answer-*"))
+
+
 def test_where_the_cache_cannot_be_written_a_private_one_serves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

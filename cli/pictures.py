@@ -26,43 +26,11 @@ if TYPE_CHECKING:
     )
     from gaitswarm.sim.controllers.surface import Surface
     from gaitswarm.sim.drives import WalkFigures
-    from gaitswarm.views.history import IterationView
     from gaitswarm.views.robots import RobotCheckView
 
 _FORMATS: Final = ("png", "svg", "pdf")
 _INK: Final = "#1f3a5f"
 _ACCENT: Final = "#d1495b"
-
-
-def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figure:
-    """Draw fitness (minimized) over iterations: best so far, median, and the best-worst band."""
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
-
-    if not iterations:
-        raise InvalidRequest("the job has no committed iteration to draw yet")
-    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
-    axes = figure.add_subplot()
-    index = [i.index for i in iterations]
-    best, median, worst = (
-        _floats([getattr(i, name) for i in iterations]) for name in ("best", "median", "worst")
-    )
-    axes.fill_between(index, best, worst, color=_INK, alpha=0.12, lw=0, label="designs")
-    axes.plot(index, median, color=_INK, alpha=0.6, lw=1.2, label="median of the iteration")
-    so_far = _floats([i.best_so_far for i in iterations])
-    label = f"best so far, finally {so_far[-1]:.4g}"
-    axes.step(index, so_far, where="post", color=_ACCENT, lw=2.2, label=label)
-    axes.set_yscale("log")
-    _plain_log_labels(axes)
-    axes.set_xlim(index[0], max(index[-1], index[0] + 1))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("iteration")
-    axes.set_ylabel("fitness, minimized  [1]")
-    axes.set_title(title, loc="left", weight="bold")
-    axes.grid(visible=True, which="both", color="0.9", lw=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="upper right")
-    return figure
 
 
 def draw_surface(surface: Surface, *, title: str) -> Figure:
@@ -142,15 +110,6 @@ def save(figure: Figure, path: Path, option: str = "output") -> None:
 
 def _floats(values: Sequence[float | None]) -> list[float]:
     return [math.nan if value is None else value for value in values]
-
-
-def _plain_log_labels(axes: Axes) -> None:
-    """Label 25 instead of 2.5 x 10^1: a fitness varies by less than a decade."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 _GROUND: Final = "#9db8d9"

@@ -648,7 +648,7 @@ def verify_history(
     With `head`, report whether a digest noted earlier is among them. With `replay`, simulate that
     number of evaluations again and compare every bit; their simulated time is limited.
     """
-    from gaitswarm.evidence.history import run_verification
+    from gaitswarm.evidence.verify import run_verification
 
     return run_verification(service, job_id, request, check=limits.check_repeated)
 

@@ -315,7 +315,14 @@ def _walked(
         if progress is not None:
             progress(done, planned)
 
-    return evaluated(cases, sample.designs, request.precision, cpus=cpus, on_task=report)
+    return evaluated(
+        cases,
+        sample.designs,
+        [request.robot],
+        request.precision,
+        cpus=cpus,
+        on_task=report,
+    )
 
 
 def sampled_indices(

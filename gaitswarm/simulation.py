@@ -497,7 +497,7 @@ def _simulated(
             )
             for scenario in scenarios
         ]
-        parts = list(evaluated(cases, designs, request.precision, cpus=cpus))
+        parts = list(evaluated(cases, designs, [request.robot], request.precision, cpus=cpus))
     statuses = np.stack([part.statuses for part in parts], axis=1)
     columns_by_walk = np.stack([part.objectives for part in parts], axis=1)
     objectives, measurements = np.split(columns_by_walk, [N_OBJECTIVES], axis=2)
@@ -523,15 +523,16 @@ def _simulated(
 def evaluated(
     cases: Sequence[Case],
     designs: Floats,
+    robots: Iterable[RobotSource],
     precision: Precision,
     *,
     cpus: int | None = None,
     on_task: OnTask | None = None,
 ) -> tuple[Outcome, ...]:
-    """Evaluate designs in cases of the same robots, in threads of this process."""
+    """Evaluate designs in threads of this process."""
     from gaitswarm.services.runtime import open_evaluator
 
-    provenance = provenance_of(*cases[0].robots, precision=precision)
+    provenance = provenance_of(*robots, precision=precision)
     asked = EvaluationRequest("", tuple(cases), designs, provenance, on_task=on_task)
     with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
         return evaluator.evaluate(asked, lambda: False)

@@ -3,50 +3,60 @@
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic_core import to_json
 
 from gaitswarm.errors import Conflict
-from gaitswarm.evidence.archive import archived
-from gaitswarm.evidence.certificates import FOLDER, SUMMARY, certificates_of, summary
-from gaitswarm.evidence.page import CertificateOnPage, bars, convergence, heat_map, page
-from gaitswarm.services.optimizer.analysis.certificate import CertificateView
+from gaitswarm.evidence.archive import (
+    ASKS,
+    BEST,
+    CERTIFICATES,
+    CHAIN,
+    EVALUATIONS,
+    ITERATIONS,
+    JOB,
+    PAGE,
+    PROVENANCE,
+    REEVALUATIONS,
+    SPEC,
+    SUMMARY,
+    BestFound,
+    ChainDocument,
+    JobDocument,
+    ProvenanceDocument,
+    archived,
+)
+from gaitswarm.evidence.page import CertificateOnPage, page, pictures
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
-from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import Link
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
-from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
-from gaitswarm.surface import SurfaceRequest, run_surface
 from gaitswarm.tables import encoded_table
 from gaitswarm.views.history import BestView, IterationView
 
-JOB: Final = "job.json"
-SPEC: Final = "spec.json"
-PROVENANCE: Final = "provenance.json"
-BEST: Final = "best.json"
-ITERATIONS: Final = "history/iterations.json"
-EVALUATIONS: Final = "history/evaluations.parquet"
-ASKS: Final = "history/asks.parquet"
-REEVALUATIONS: Final = "history/reevaluations.parquet"
-CHAIN: Final = "history/chain.json"
-PAGE: Final = "index.html"
+WORST: Final = 20
+"""Worst worlds in the summary of a certificate."""
 
 _PIECE: Final = 1000
+
+Place = tuple[int, int]
+"""Iteration and particle of a design."""
 
 
 def evidence(service: JobService, job_id: str) -> bytes:
@@ -56,111 +66,96 @@ def evidence(service: JobService, job_id: str) -> bytes:
         raise Conflict(f"job {job_id} has committed no iteration yet, so there is no evidence")
     run = _run(service, job)
     files = dict(run.files)
-    shown = [] if run.summary is None else [CertificateOnPage(run.summary, None)]
-    for certified in certificates_of(service, job, run.columns, run.place):
-        own = _run(service, certified.job)
-        files |= {f"{FOLDER}/{certified.job.id}/{name}": c for name, c in own.files.items()}
-        if own.summary is not None:
-            shown.append(CertificateOnPage(own.summary, certified))
-    pictures = dict(_pictures(job.spec, run.best, run.iterations))
-    files |= {f"figures/{name}.svg": picture.encode() for name, picture in pictures.items()}
-    files[PAGE] = page(job, run.best, run.provenance, pictures, shown, tuple(files)).encode()
+    shown = [] if run.summary is None else [CertificateOnPage(run.summary)]
+    best = None if run.best is None else (run.best.iteration, run.best.particle)
+    certified = [
+        (place != best, one.created_at, one.id, place, one)
+        for one in _certificates(service)
+        for place in (certified_place(job.spec, run.columns, one.spec),)
+        if place is not None
+    ]
+    for is_other, _, certificate_id, place, certificate_job in sorted(certified):
+        part = _run(service, certificate_job)
+        files |= {f"{CERTIFICATES}/{certificate_id}/{name}": c for name, c in part.files.items()}
+        if part.summary is not None:
+            shown.append(CertificateOnPage(part.summary, place, is_best=not is_other))
+    figures = dict(pictures(job.spec, run.best, run.iterations))
+    files |= {f"figures/{name}.svg": picture.encode() for name, picture in figures.items()}
+    files[PAGE] = page(job, run.best, run.provenance, figures, shown, tuple(files)).encode()
     return archived(files)
 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """The stored data of one job.
+    """The stored data of one job: its members without page and figures, and parts of them.
 
     Attributes:
-        files: Members by name, without the page and figures.
-        columns: Evaluations.
-        iterations: Summaries.
-        provenance: As `provenance_document` has it.
-        best: The best design, with its `place`: iteration and particle.
         summary: Of a certificate with at least one drawn world.
     """
 
     files: Mapping[str, bytes]
     columns: EvaluationColumns
     iterations: Sequence[IterationView]
-    provenance: Mapping[str, Any]
+    provenance: ProvenanceDocument
     best: BestView | None
     summary: CertificateView | None
 
-    @property
-    def place(self) -> tuple[int, int] | None:
-        return None if self.best is None else (self.best.iteration, self.best.particle)
-
 
 def _run(service: JobService, job: Job) -> _Run:
-    spec, columns = job.spec, _committed(service.columns(job), job)
+    # A running job commits more meanwhile; the file ends where the job did when it was read.
+    spec, store, end = job.spec, service.store, job.progress.iterations
+    columns = service.columns(job)
+    columns = columns.rows(slice(int(np.searchsorted(columns.iteration, end))))
     reevaluated = None
     if spec.precision != "double":
-        reevaluated = _reevaluated(service, job, columns)
-    # Not the store's best: a running job's may be in an iteration that is not in the file.
+        reevaluated = in_double(columns, store.reevaluations(job.id, 0, end))
     best = best_of(columns, reevaluated)
-    iterations = list(_iterations(service, job))
     view = None if best is None else BestView.from_evaluation(best, spec)
-    provenance = provenance_document(job)
-    documents: dict[str, Any] = {
+    links = [
+        stored.link
+        for first in range(0, end, _PIECE)
+        for stored in store.links(job.id, first, min(first + _PIECE, end))
+    ]
+    iterations = list(_iterations(service, job))
+    provenance = ProvenanceDocument(
+        records=job.provenance, written_by=job_provenance(spec), kernels=kernels_of(spec)
+    )
+    stored = store.chain_documents(job.id)
+    documents: dict[str, object] = {
         JOB: _job(job, best),
-        SPEC: json.loads(spec.model_dump_json()),
+        SPEC: spec,
         PROVENANCE: provenance,
-        BEST: None if view is None else json.loads(view.model_dump_json()),
-        ITERATIONS: [json.loads(iteration.model_dump_json()) for iteration in iterations],
+        BEST: view,
+        ITERATIONS: iterations,
+        CHAIN: ChainDocument(
+            version=CHAIN_VERSION,
+            spec=stored.spec,
+            lineage=stored.lineage,
+            provenance=stored.provenance,
+            asks=[link.ask_digest for link in links],
+            digests=[link.digest for link in links],
+        ),
     }
-    documents[CHAIN] = chain_document(service, job)
-    certified = None
+    summary = None
     if isinstance(spec, CertificateSpec) and len(columns) > spec.nominal_rows:
-        certified = summary(job.id, spec, columns)
-        documents[SUMMARY] = json.loads(certified.model_dump_json())
-    files: dict[str, bytes] = {name: _json(document) for name, document in documents.items()}
+        documents[SUMMARY] = summary = certificate(job.id, spec, columns, most=WORST)
+    for name in spec.recording_ids:
+        documents[f"recordings/{name}.json"] = service.recording(name)
+    files = {name: to_json(document, indent=2) + b"\n" for name, document in documents.items()}
     files[EVALUATIONS] = b"".join(encoded_table("parquet", spec, [columns]))
-    files[ASKS] = _asks(spec, service.asked_positions(job))
+    files[ASKS] = _asks(spec, links)
     if reevaluated is not None:
         parts = [reevaluated] if len(reevaluated) else []
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
-    for name in spec.recording_ids:
-        files[f"recordings/{name}.json"] = service.recording(name).model_dump_json().encode()
     for number, robot in enumerate(spec.robot_sources):
         files |= _robot(f"robots/{number}", robot)
-    return _Run(files, columns, iterations, provenance, view, certified)
+    return _Run(files, columns, iterations, provenance, view, summary)
 
 
-def provenance_document(job: Job) -> dict[str, Any]:
-    """Provenance of a job's numbers and of this file."""
-    here = job_provenance(job.spec)
-    kernels = [
-        kernel_identity(load_robot(robot), job.spec.precision).hex()
-        for robot in job.spec.robot_sources
-    ]
-    return {
-        "records": [record.model_dump(mode="json") for record in job.provenance],
-        "written_by": here.model_dump(mode="json"),
-        "kernels": kernels,
-    }
-
-
-def chain_document(service: JobService, job: Job) -> dict[str, Any]:
-    """Stored documents that the chain of a job's history covers besides its tables."""
-    stored = service.store.chain_documents(job.id)
-    links = [link for piece in _links(service, job) for link in piece]
-    return {
-        "version": CHAIN_VERSION,
-        "spec": stored.spec,
-        "lineage": stored.lineage,
-        "provenance": stored.provenance,
-        "asks": [link.ask_digest for link in links],
-        "digests": [link.digest for link in links],
-    }
-
-
-def _links(service: JobService, job: Job) -> Iterator[list[Link]]:
-    end = job.progress.iterations
-    for first in range(0, end, _PIECE):
-        found = service.store.links(job.id, first, min(first + _PIECE, end))
-        yield [stored.link for stored in found]
+def kernels_of(spec: AnySpec) -> tuple[str, ...]:
+    """Identity of the kernel of each robot of a job."""
+    robots = map(load_robot, spec.robot_sources)
+    return tuple(kernel_identity(robot, spec.precision).hex() for robot in robots)
 
 
 def best_of(columns: EvaluationColumns, reevaluated: EvaluationColumns | None) -> Evaluation | None:
@@ -172,15 +167,60 @@ def best_of(columns: EvaluationColumns, reevaluated: EvaluationColumns | None) -
     if reevaluated is None:
         return _evaluation(columns, row)
     best = _evaluation(reevaluated, row)
-    searched = _evaluation(columns, row_of(columns, best.iteration, best.particle))
-    in_double = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
-    return replace(searched, reevaluation=in_double)
+    searched = _evaluation(columns, row_of(columns, (best.iteration, best.particle)))
+    again = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
+    return replace(searched, reevaluation=again)
 
 
-def row_of(columns: EvaluationColumns, iteration: int, particle: int) -> int:
-    """Find an evaluation."""
-    (row,) = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
-    return int(row)
+def row_of(columns: EvaluationColumns, place: Place) -> int:
+    """Find an evaluation. Raises LookupError if there is none."""
+    iteration, particle = place
+    (rows,) = np.nonzero((columns.iteration == iteration) & (columns.particle == particle))
+    if len(rows) != 1:
+        raise LookupError(f"there is no design {iteration}.{particle}")
+    return int(rows[0])
+
+
+def in_double(
+    columns: EvaluationColumns, found: Sequence[tuple[int, Reevaluation]]
+) -> EvaluationColumns:
+    """The designs that were reevaluated, with their results in double precision."""
+    if not found:
+        return columns.rows(slice(0))
+    starts = np.searchsorted(columns.iteration, [iteration for iteration, _ in found])
+    return replace(
+        columns.rows(starts + np.array([again.particle for _, again in found])),
+        objectives=np.stack([again.objectives for _, again in found]),
+        statuses=np.stack([again.statuses for _, again in found]),
+        fitness=np.array([again.fitness for _, again in found]),
+    )
+
+
+def certified_place(
+    spec: AnySpec, columns: EvaluationColumns, certificate_spec: AnySpec
+) -> Place | None:
+    """Find the design of a job that a certificate is of."""
+    if not isinstance(spec, JobSpec) or not isinstance(certificate_spec, CertificateSpec):
+        return None
+    space, numbers = spec.design_space(), certificate_spec.numbers
+    if certificate_spec.controller != spec.controller or set(numbers) != set(space.names):
+        return None
+    design = np.array([numbers[name] for name in space.names])
+    (rows,) = np.nonzero((space.simulated(columns.designs) == design).all(axis=1))
+    if not len(rows):
+        return None
+    return int(columns.iteration[rows[0]]), int(columns.particle[rows[0]])
+
+
+def _certificates(service: JobService) -> Iterator[Job]:
+    """All certificates that have succeeded."""
+    after: str | None = None
+    while True:
+        found = service.store.jobs(state=JobState.SUCCEEDED, kind="certificate", after=after)
+        yield from (job for job in found.items if job.readable)
+        if found.next is None:
+            return
+        after = found.next
 
 
 def _evaluation(columns: EvaluationColumns, row: int) -> Evaluation:
@@ -194,76 +234,55 @@ def _evaluation(columns: EvaluationColumns, row: int) -> Evaluation:
     )
 
 
-def _committed(columns: EvaluationColumns, job: Job) -> EvaluationColumns:
-    """Evaluations without those committed after the job was read."""
-    end = int(np.searchsorted(columns.iteration, job.progress.iterations))
-    return columns.rows(slice(end))
-
-
-def _job(job: Job, best: Evaluation | None) -> dict[str, Any]:
-    times = {"created_at": job.created_at, "started_at": job.started_at}
-    times |= {"updated_at": job.updated_at, "finished_at": job.finished_at}
+def _job(job: Job, best: Evaluation | None) -> JobDocument:
     found = None
     if best is not None:
-        fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
-        found = {"iteration": best.iteration, "particle": best.particle, "fitness": fitness}
-    return {
-        "id": job.id,
-        "name": job.spec.name,
-        "kind": job.spec.kind,
-        "state": job.state.value,
-        **{name: None if time is None else time.isoformat() for name, time in times.items()},
-        "iterations": job.progress.iterations,
-        "evaluations": job.progress.evaluations,
-        "lineage": None if job.lineage is None else job.lineage.model_dump(mode="json"),
-        "budgets": list(budgets_of(job)),
-        "best": found,
-    }
+        judged = best.reevaluation or best
+        found = BestFound(iteration=best.iteration, particle=best.particle, fitness=judged.fitness)
+    return JobDocument(
+        id=job.id,
+        name=job.spec.name,
+        kind=job.spec.kind,
+        state=job.state,
+        created_at=job.created_at,
+        started_at=job.started_at,
+        updated_at=job.updated_at,
+        finished_at=job.finished_at,
+        iterations=job.progress.iterations,
+        evaluations=job.progress.evaluations,
+        lineage=job.lineage,
+        budgets=budgets_of(job),
+        best=found,
+    )
 
 
 def _iterations(service: JobService, job: Job) -> Iterator[IterationView]:
     after: int | None = None
     while True:
-        page_of = service.store.iterations(job.id, after=after, limit=_PIECE)
-        for iteration in page_of.items:
+        found = service.store.iterations(job.id, after=after, limit=_PIECE)
+        for iteration in found.items:
             if iteration.index < job.progress.iterations:
                 yield IterationView.model_validate(iteration)
             after = iteration.index
-        if page_of.next is None:
+        if found.next is None:
             return
 
 
-def _asks(spec: AnySpec, asked: Sequence[NDArray[np.float64]]) -> bytes:
+def _asks(spec: AnySpec, links: Sequence[Link]) -> bytes:
     """Positions that the search asked for, one per row, in the variables' units."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    positions = np.concatenate(asked)
-    sizes = [len(one) for one in asked]
-    columns = {
-        "iteration": pa.array(np.repeat(np.arange(len(asked)), sizes)),
-        "particle": pa.array(np.concatenate([np.arange(size) for size in sizes])),
+    columns: dict[str, NDArray[np.generic]] = {
+        "iteration": np.concatenate([np.full(len(k.positions), k.iteration) for k in links]),
+        "particle": np.concatenate([np.arange(len(link.positions)) for link in links]),
     }
+    positions = np.concatenate([link.positions for link in links])
     for variable, column in zip(spec.design_space().variables, positions.T, strict=True):
-        columns[f"position.{variable.name}"] = pa.array(column)
+        columns[f"position.{variable.name}"] = column
     sink = io.BytesIO()
     pq.write_table(pa.table(columns), sink)
     return sink.getvalue()
-
-
-def _reevaluated(service: JobService, job: Job, columns: EvaluationColumns) -> EvaluationColumns:
-    """Designs that were reevaluated in double precision."""
-    committed = job.progress.iterations
-    found = [(k, again) for k, again in service.store.reevaluations(job.id) if k < committed]
-    if not found:
-        return columns.rows(slice(0))
-    starts = np.searchsorted(columns.iteration, [k for k, _ in found])
-    return replace(
-        columns.rows(starts + np.array([again.particle for _, again in found])),
-        objectives=np.stack([again.objectives for _, again in found]),
-        statuses=np.stack([again.statuses for _, again in found]),
-        fitness=np.array([again.fitness for _, again in found]),
-    )
 
 
 def _robot(folder: str, source: RobotSource) -> dict[str, bytes]:
@@ -280,46 +299,3 @@ def _robot(folder: str, source: RobotSource) -> dict[str, bytes]:
         if file.name.endswith(".toml"):
             files[f"{folder}/{file.name}"] = file.read_bytes()
     return files
-
-
-def _pictures(
-    spec: AnySpec, best: BestView | None, iterations: Sequence[IterationView]
-) -> Iterator[tuple[str, str]]:
-    yield "convergence", convergence(iterations)
-    if best is None:
-        return
-    results = best.scenarios
-    yield (
-        "scenarios",
-        bars(
-            list(results),
-            [result.utility for result in results.values()],
-            label="utility, minimized",
-            title="Best design: utility in each case",
-        ),
-    )
-    if isinstance(spec, JobSpec):
-        yield from _surfaces(spec, best.design)
-
-
-def _surfaces(spec: JobSpec, design: Mapping[str, float | str]) -> Iterator[tuple[str, str]]:
-    request = SurfaceRequest(design=dict(design), error_points=49, current_points=25)
-    try:
-        view = run_surface(spec.controller, request)
-    except InvalidRequest:
-        # A controller that is not fuzzy has none.
-        return
-    for output in view.outputs:
-        yield (
-            f"surface-{output.name}",
-            heat_map(
-                np.array(output.table),
-                across="angle error, from its least to its greatest",
-                up="motor current, from its least to its greatest",
-                title=f"Output {output.name} over angle error and motor current",
-            ),
-        )
-
-
-def _json(document: Any) -> bytes:
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False).encode() + b"\n"

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from gaitswarm.evidence.archive import parsed_json
-from gaitswarm.evidence.contents import (
+from gaitswarm.evidence.archive import (
     ASKS,
     CHAIN,
     EVALUATIONS,
@@ -19,11 +18,13 @@ from gaitswarm.evidence.contents import (
     PROVENANCE,
     REEVALUATIONS,
     SPEC,
+    ChainDocument,
+    JobDocument,
+    ProvenanceDocument,
+    parsed_json,
 )
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
-from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
 from gaitswarm.sim.input import message_of
@@ -48,73 +49,18 @@ M = TypeVar("M", bound=BaseModel)
 
 Floats = NDArray[np.float64]
 
-Budget = Annotated[int, Field(ge=1, le=1_000_000)]
-
-
-class _Read(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
-
-
-class BestFound(_Read):
-    """The best design's place and fitness in double precision."""
-
-    iteration: int = Field(ge=0)
-    particle: int = Field(ge=0)
-    fitness: float
-
-
-class JobDocument(_Read):
-    """The job's metadata."""
-
-    id: str = Field(max_length=64)
-    iterations: int = Field(ge=1)
-    evaluations: int = Field(ge=1)
-    lineage: Lineage | None
-    budgets: tuple[Budget, ...] = Field(min_length=1, max_length=100)
-    best: BestFound | None
-
-
-class ProvenanceDocument(_Read):
-    """Provenance of the numbers and of the file."""
-
-    records: tuple[ProvenanceRecord, ...] = Field(min_length=1)
-    written_by: JobProvenance
-    kernels: tuple[str, ...]
-
-
-class ChainDocument(_Read):
-    """Stored documents that the chain covers besides the tables."""
-
-    version: int
-    spec: dict[str, Any]
-    lineage: dict[str, Any] | None
-    provenance: tuple[dict[str, Any], ...] | None
-    asks: tuple[str | None, ...]
-    digests: tuple[str | None, ...]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """The contents of an evidence file.
-
-    Attributes:
-        job: Metadata.
-        spec: The job's spec.
-        provenance: Of its numbers.
-        columns: All evaluations.
-        asked: (n, d) positions that the search asked for, by iteration.
-        reevaluated: Designs reevaluated in double precision; None for a search in double.
-        recordings: Recordings that its cases need.
-        chain: Of its history.
-    """
+    """The contents of an evidence file."""
 
     job: JobDocument
     spec: AnySpec
     provenance: ProvenanceDocument
     columns: EvaluationColumns
-    asked: tuple[Floats, ...]
-    reevaluated: EvaluationColumns | None
-    recordings: Recordings
+    asked: tuple[Floats, ...]  # (n, d) positions, by iteration
+    reevaluated: EvaluationColumns | None  # in double precision; None for a search in double
+    recordings: Recordings  # that its cases need
     chain: ChainDocument
 
 
@@ -278,8 +224,3 @@ def _checked_table(content: bytes, name: str) -> pa.Table:
         if isinstance(error, BadArchive):
             raise
         raise BadArchive(f"{name} is not a complete Parquet file") from error
-
-
-def by_iteration(evidence: Evidence, column: Floats) -> Sequence[Floats]:
-    """Split a column by iteration."""
-    return np.split(column, np.cumsum([len(positions) for positions in evidence.asked])[:-1])

@@ -1,265 +1,225 @@
-"""Verification of evidence: consistency, derived values and replays."""
+"""Verification of evidence and of stored histories: consistency, derived values and replays."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.errors import InvalidRequest, NotFound, Unavailable
-from gaitswarm.evidence.archive import check_hashes, parsed_json
-from gaitswarm.evidence.certificates import (
+from gaitswarm.evidence.archive import (
+    BEST,
+    CERTIFICATES,
+    CHAIN,
+    JOB,
     SUMMARY,
-    by_certificate,
-    certified_at,
-    how_to_make_one,
-    summary_differs,
+    check_hashes,
+    parsed_json,
 )
-from gaitswarm.evidence.contents import BEST, CHAIN, JOB, best_of, row_of
-from gaitswarm.evidence.history import chain_check, head_check
-from gaitswarm.evidence.reading import Evidence, by_iteration, check_robots, read_evidence
-from gaitswarm.evidence.replay import (
-    has_same_bits_anywhere,
-    replay_answer,
-    simulated_differences,
-    why_no_replay,
+from gaitswarm.evidence.contents import (
+    WORST,
+    Place,
+    best_of,
+    certified_place,
+    in_double,
+    kernels_of,
+    row_of,
 )
+from gaitswarm.evidence.reading import Evidence, check_robots, read_evidence
+from gaitswarm.services.optimizer.analysis.certificate import certificate as certificate_view
 from gaitswarm.services.optimizer.analysis.fork import retraced
-from gaitswarm.services.optimizer.analysis.verification import BrokenChain, Chain, judged
+from gaitswarm.services.optimizer.analysis.verification import (
+    BrokenChain,
+    Chain,
+    check_history,
+    judged,
+)
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link, Outcomes
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.iteration import Reevaluation, best_particle
+from gaitswarm.services.optimizer.jobs.iteration import Reevaluation
+from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.provenance import RECORDS, job_provenance
+from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecord, job_provenance
 from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.views import finite
 from gaitswarm.settings import place_of
-from gaitswarm.sim.kernel.emitted.source import kernel_identity
-from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.mujoco.engines import ENGINE
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.simulation import evaluated
 from gaitswarm.views.history import BestView
-from gaitswarm.views.verification import DIGEST, CheckView, DifferenceView, VerificationView
+from gaitswarm.views.verification import (
+    DIGEST,
+    CheckView,
+    DifferenceView,
+    HistoryVerificationView,
+    VerificationRequest,
+    VerificationView,
+)
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.analysis.verification import HistoryCheck
 
 _DIGITS: Final = 32
+
+_SHOWN: Final = 100
+"""Differences that are listed at most."""
+
+_TOLERANCE: Final = 1e-9
+"""Relative tolerance for numbers computed by statistics libraries."""
 
 Answer = tuple[bool | None, str]
 """Whether a check passed, None where it does not apply; and the details."""
 
 
-def checks_of(evidence: Evidence, members: Mapping[str, bytes]) -> dict[str, Callable[[], Answer]]:
-    """List the checks that need no simulation."""
-    found: dict[str, Callable[[], Answer]] = {
-        "robot": lambda: _robot(evidence, members),
-        "fitness": lambda: _fitness(evidence),
-        "best": lambda: _best(evidence, members),
-        "designs": lambda: _designs(evidence),
-        "search": lambda: _search(evidence),
-        "chain": lambda: _chain(evidence),
-    }
-    if SUMMARY in members:
-        found["summary"] = lambda: _summary(evidence, members)
-    return found
-
-
-def _tables(evidence: Evidence) -> Iterator[tuple[AnySpec, EvaluationColumns]]:
-    yield evidence.spec, evidence.columns
-    if evidence.reevaluated is not None:
-        yield evidence.spec.in_double(), evidence.reevaluated
-
-
-def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """Check the robots' files against the digests of the provenance."""
-    content = b""
-    for number in range(len(evidence.spec.robot_sources)):
-        folder = f"robots/{number}"
-        for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
-            if name not in members:
-                return False, f"it has no {name}"
-            content += members[name]
-    expected = evidence.provenance.records[-1].provenance.simulation.robot_digest
-    if hashlib.sha256(content).hexdigest()[:_DIGITS] != expected:
-        return False, "the robot's files are not those that the provenance names"
-    return True, f"its files have the digest {expected} of the provenance"
-
-
-def _fitness(evidence: Evidence) -> Answer:
-    """Check that fitness follows from the raw objectives."""
-    wrong, count = 0, 0
-    for spec, columns in _tables(evidence):
-        again = judged(spec, columns)
-        wrong += int((again.view(np.uint64) != columns.fitness.view(np.uint64)).sum())
-        count += len(columns)
-    if wrong:
-        return False, f"{wrong} of {count} do not follow from the raw objectives"
-    return True, f"{count} of {count} follow from the raw objectives, to the bit"
-
-
-def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """Check that the best design is the earliest of least fitness in double precision."""
-    best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
-    if best is None or said is None:
-        return best is None and said is None, "no design has succeeded in every case"
-    where = (best.iteration, best.particle)
-    fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
-    if (said.iteration, said.particle, said.fitness) != (*where, fitness):
-        return False, (f"design {place_of(*where)} is the best with {fitness!r}, not the named one")
-    shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
-    if parsed_json(members.get(BEST, b""), BEST) != shown:
-        return False, f"{BEST} does not show design {place_of(*where)}"
-    return True, f"design {place_of(*where)}, {fitness!r}, is the least of all"
-
-
-def best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:
-    """Find the best evaluation."""
-    judged = evidence.columns if evidence.reevaluated is None else evidence.reevaluated
-    return (best_particle(judged.fitness) if len(judged) else None), judged
-
-
-def _designs(evidence: Evidence) -> Answer:
-    """Check that designs correspond to the asks."""
-    space = evidence.spec.design_space()
-    designs = space.designs(np.concatenate(evidence.asked))
-    wrong = int((designs != evidence.columns.designs).any(axis=1).sum())
-    if wrong:
-        return False, f"{wrong} of {len(designs)} are not what the search asked for"
-    return True, f"{len(designs)} of {len(designs)} are what the search asked for"
-
-
-def _search(evidence: Evidence) -> Answer:
-    """Check that the search proposes the same designs again."""
-    spec, lineage = evidence.spec, evidence.job.lineage
-    method = METHODS[spec.search.name]
-    if method.missing:
-        return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
-    columns = evidence.columns
-    results = spec.search_feedback(columns.objectives, columns.failed, columns.fitness)
-    feedback = by_iteration(evidence, results)
-    try:
-        retraced(spec, evidence.job.budgets, evidence.asked, feedback)
-    except ValueError as error:
-        if lineage is not None and lineage.carried == "search" and "preference" in lineage.changed:
-            return None, "its state was judged by another preference when it was forked"
-        return False, f"{error}: other code, another seed, or other results"
-    return True, f"{spec.search.name} proposes the same designs in {len(feedback)} iterations"
-
-
-def _chain(evidence: Evidence) -> Answer:
-    """Check the history against its digests."""
-    said = evidence.chain
-    if said.version != CHAIN_VERSION:
-        return None, f"it is of version {said.version}, which this gaitswarm does not compute"
-    stored = (SPECS.validate_python(said.spec), said.lineage, said.provenance)
-    if not _belongs(evidence, *stored):
-        return False, f"{CHAIN} has another spec, lineage or provenance than the rest of the file"
-    documents = ChainDocuments(said.spec, said.lineage, said.provenance)
-    found = Chain(documents, evidence.spec)
-    reevaluated = _reevaluations(evidence)
-    links = zip(evidence.asked, said.asks, said.digests, strict=True)
-    try:
-        for index, (positions, ask, digest) in enumerate(links):
-            columns = evidence.columns.of_iteration(index)
-            link = Link(index, positions, ask, digest)
-            found.extend(link, Outcomes.read(columns, reevaluated.get(index)))
-    except BrokenChain as error:
-        return False, str(error)
-    check = chain_check(found.iterations, found.head)
-    return check.passed, check.detail
-
-
-def _belongs(evidence: Evidence, spec: AnySpec, lineage: Any, provenance: Any) -> bool:
-    """Whether stored documents agree with the rest of the file."""
-    own = evidence.job.lineage
-    return (
-        evidence.spec in (spec, spec.with_budget(evidence.spec.iterations))
-        and (None if lineage is None else Lineage.model_validate(lineage)) == own
-        and RECORDS.validate_python(provenance or ()) == evidence.provenance.records
-    )
-
-
-def _reevaluations(evidence: Evidence) -> dict[int, Reevaluation]:
-    """Reevaluations by iteration."""
-    columns = evidence.reevaluated
-    if columns is None:
-        return {}
-    return {
-        int(columns.iteration[row]): Reevaluation(
-            int(columns.particle[row]),
-            columns.objectives[row],
-            columns.statuses[row],
-            float(columns.fitness[row]),
-        )
-        for row in range(len(columns))
-    }
-
-
-def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """Check that a certificate's summary follows from its evaluations."""
-    spec = evidence.spec
-    if not isinstance(spec, CertificateSpec):
-        return False, f"a job of kind {spec.kind} has no {SUMMARY}"
-    where = summary_differs(evidence.job.id, spec, evidence.columns, members[SUMMARY])
-    if where is not None:
-        return False, f"{SUMMARY} has another {where} than follows from the evaluations"
-    return True, f"{SUMMARY} follows from {len(evidence.columns)} evaluations"
-
-
-def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
-    """Yield changes of provenance on this machine, and what they mean."""
-    spec, here = evidence.spec, job_provenance(evidence.spec)
-    found: list[str] = []
-    for record in evidence.provenance.records:
-        found += [
-            f"from iteration {record.from_iteration} on: {change}"
-            for change in record.provenance.changes(here)
-        ]
-    yield from found
-    if not found:
-        return
-    kernels = tuple(
-        kernel_identity(load_robot(r), spec.precision).hex() for r in spec.robot_sources
-    )
-    if kernels == evidence.provenance.kernels:
-        yield (
-            "the kernels' source is the same as when the file was written: physics and"
-            " control loop are the same, and the changes are outside of them"
-        )
-    else:
-        yield "the kernels' source differs from when the file was written: results may differ"
-    yield "equal bits in the replay show that these changes do not matter for what was replayed"
-
-
-_SHOWN: Final = 100
-"""Differences that are listed at most."""
-
-
 @dataclass(slots=True)
-class _Found:
+class _Report:
+    """Results of checks, in their order."""
+
     checks: list[CheckView] = field(default_factory=list)
     differences: list[DifferenceView] = field(default_factory=list)
     provenance: list[str] = field(default_factory=list)
-    job: str | None = None
     replayed: int = 0
 
-    def add(
-        self, name: str, passed: bool | None, detail: str, certificate: str | None = None
-    ) -> None:
+    def add(self, name: str, answer: Answer, certificate: str | None = None) -> None:
+        passed, detail = answer
         self.checks.append(
             CheckView(name=name, passed=passed, detail=detail, certificate=certificate)
         )
+
+    def replay(
+        self,
+        spec: AnySpec,
+        columns: EvaluationColumns,
+        best: tuple[Place, EvaluationColumns | None] | None,
+        recordings: Recordings,
+        certificate: str | None = None,
+    ) -> Answer:
+        """Simulate evaluations again and compare every bit.
+
+        best: place of the best design, with its reevaluation in double precision if there is one.
+        """
+        if isinstance(spec, CertificateSpec) and spec.engines:
+            # Other engines have other bits on other machines.
+            engines = columns.designs[:, spec.design_space().names.index(ENGINE)]
+            columns = columns.rows(np.flatnonzero(engines == 0.0))
+        tables, among = [(spec, columns)], ""
+        if best is not None and best[0] in zip(columns.iteration, columns.particle, strict=True):
+            among = ", the best among them,"
+            if best[1] is not None:
+                tables.append((spec.in_double(), best[1]))
+        differences = list(_differences(tables, recordings, certificate))
+        self.differences += differences
+        self.replayed += len(columns)
+        what = f"{len(columns)} evaluations{among} in {len(spec.case_names)} cases"
+        if not differences:
+            return True, f"{what}: every bit is the same"
+        evaluations = len({(d.iteration, d.particle) for d in differences})
+        return False, f"{what}: {len(differences)} numbers of {evaluations} of them differ"
+
+    def fields(self) -> dict[str, Any]:
+        """Fields of a `ReplayedView` but for the seed."""
+        return {
+            "verified": all(check.passed is not False for check in self.checks),
+            "checks": self.checks,
+            "provenance": self.provenance,
+            "replayed": self.replayed,
+            "differences": self.differences[:_SHOWN],
+        }
+
+
+def run_verification(
+    service: JobService,
+    job_id: str,
+    request: VerificationRequest,
+    *,
+    check: Callable[[float], None] = lambda _seconds: None,
+) -> HistoryVerificationView:
+    """Recompute a job's chain from the store and repeat some evaluations.
+
+    `check` is called with the simulated time of these [s].
+    """
+    job, report = service.job(job_id), _Report()
+    seed = secrets.randbelow(1 << 32) if request.seed is None else request.seed
+    history = check_history(service.store, job, head=request.head)
+    if history.problem:
+        where = "" if history.broken_at is None else f"iteration {history.broken_at}: "
+        report.add("chain", (False, f"{where}{history.problem}"))
+    else:
+        report.add("chain", _intact(history.iterations, history.head))
+    if request.head is not None:
+        report.add("head", _head(request.head, history.head_found_at, history.iterations))
+    if request.replay and job.readable:
+        report.provenance += _changes(job.spec, job.provenance)
+    if request.replay and history.sizes:
+        rng = np.random.default_rng(seed)
+        answer = _replay_stored(service, job, history, report, request.replay, rng, check)
+        report.add("replay", answer)
+    return HistoryVerificationView(
+        job=job.id,
+        iterations=history.iterations,
+        head=history.head,
+        broken_at=history.broken_at,
+        seed=seed,
+        **report.fields(),
+    )
+
+
+def _replay_stored(
+    service: JobService,
+    job: Job,
+    history: HistoryCheck,
+    report: _Report,
+    count: int,
+    drawn: np.random.Generator,
+    check: Callable[[float], None],
+) -> Answer:
+    """Repeat drawn evaluations and the best one; only their iterations are read."""
+    spec, store, progress = job.spec, service.store, job.progress
+    refused = _why_no_replay(spec)
+    if refused is not None:
+        return refused
+    ends = np.cumsum(history.sizes)
+    begins = ends - history.sizes
+    rows = drawn.permutation(int(ends[-1]))[:count]
+    best = None
+    if progress.best_iteration is not None and progress.best_particle is not None:
+        iteration = progress.best_iteration
+        if iteration < len(ends):
+            rows = np.append(rows, begins[iteration] + progress.best_particle)
+            best = (iteration, progress.best_particle)
+    rows = np.unique(rows)
+    recordings = store.recordings(spec.recording_ids)
+    check(len(rows) * duration(spec, spec.cases(recordings)))
+    at = np.searchsorted(ends, rows, side="right")
+    pieces, again = [], None
+    for iteration in np.unique(at).tolist():
+        columns = store.evaluation_columns(job.id, iteration, iteration + 1)
+        if columns is None:
+            raise NotFound(f"job {job.id} has no iteration {iteration} any more")
+        pieces.append(columns.rows(rows[at == iteration] - begins[iteration]))
+        if spec.precision != "double" and best is not None and iteration == best[0]:
+            again = in_double(columns, store.reevaluations(job.id, iteration, iteration + 1))
+    arrays = zip(*(piece.arrays for piece in pieces), strict=True)
+    columns = EvaluationColumns(*(np.concatenate(parts) for parts in arrays))
+    return report.replay(spec, columns, None if best is None else (best, again), recordings)
 
 
 def verify(
@@ -297,21 +257,25 @@ def verify(
         raise InvalidRequest("must be 64 hexadecimal digits, in lower case", field="head")
     seed = secrets.randbelow(1 << 32) if seed is None else seed
     content = evidence if isinstance(evidence, bytes) else _content(Path(evidence))
-    found = _Found()
+    report, job_id = _Report(), None
     try:
-        _check(content, found, replay, seed, head)
+        members = unzipped(content)
+        wrong = check_hashes(members)
+        report.add("archive", (True, f"{len(members)} members, none compressed or hidden"))
+        hashes = f"SHA-256 of {len(members) - 1} members are those of the manifest"
+        report.add("hashes", (not wrong, "; ".join(wrong[:5]) or hashes))
+        check_robots(members)
+        job = _check_run(members, report, replay, np.random.default_rng(seed))
+        job_id = job.job.id
+        if head is not None:
+            digests = job.chain.digests
+            at = digests.index(head) if head in digests else None
+            report.add("head", _head(head, at, len(job.asked)))
+        _check_certificates(job, members, report, replay, seed)
     except BadArchive as error:
-        found.add("contents" if found.checks else "archive", False, str(error))
-    return VerificationView(
-        sha256=hashlib.sha256(content).hexdigest(),
-        job=found.job,
-        verified=all(check.passed is not False for check in found.checks),
-        checks=found.checks,
-        provenance=found.provenance,
-        replayed=found.replayed,
-        seed=seed,
-        differences=found.differences[:_SHOWN],
-    )
+        report.add("contents" if report.checks else "archive", (False, str(error)))
+    digest = hashlib.sha256(content).hexdigest()
+    return VerificationView(sha256=digest, job=job_id, seed=seed, **report.fields())
 
 
 def _content(path: Path) -> bytes:
@@ -324,66 +288,9 @@ def _content(path: Path) -> bytes:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="evidence") from error
 
 
-def _check(content: bytes, found: _Found, replay: int, seed: int, head: str | None) -> None:
-    members = unzipped(content)
-    wrong = check_hashes(members)
-    found.add("archive", True, f"{len(members)} members, none compressed or hidden")
-    hashes = f"SHA-256 of {len(members) - 1} members are those of the manifest"
-    found.add("hashes", not wrong, "; ".join(wrong[:5]) or hashes)
-    check_robots(members)
-    evidence = _check_run(members, found, replay, np.random.default_rng(seed))
-    found.job = evidence.job.id
-    if head is not None:
-        digests = evidence.chain.digests
-        at = digests.index(head) if head in digests else None
-        found.checks.append(head_check(head, at, len(evidence.asked)))
-    certificates = by_certificate(members)
-    for number, (job_id, own) in enumerate(sorted(certificates.items())):
-        drawn = np.random.default_rng((seed, number))
-        try:
-            _check_certificate(evidence, job_id, own, found, replay, drawn)
-        except BadArchive as error:
-            found.add("contents", False, str(error), job_id)
-    if isinstance(evidence.spec, JobSpec):
-        said = f"{len(certificates)} of designs of this job"
-        none = f"there is none; {how_to_make_one(evidence.job.id)}"
-        passed = True if certificates else None
-        found.add("certificates", passed, said if certificates else none)
-
-
-def _check_certificate(
-    evidence: Evidence,
-    job_id: str,
-    members: Mapping[str, bytes],
-    found: _Found,
-    replay: int,
-    drawn: np.random.Generator,
-) -> None:
-    """Check a certificate of a design of the job that the evidence is of."""
-    if SUMMARY not in members:
-        raise BadArchive(f"it has no {SUMMARY}")
-    certificate = _check_run(members, found, replay, drawn, job_id)
-    if certificate.job.id != job_id:
-        raise BadArchive(f"{JOB} is of another certificate than its folder")
-    passed, detail = _tried(lambda: _design(evidence, certificate))
-    found.add("design", passed, detail, job_id)
-
-
-def _design(evidence: Evidence, certificate: Evidence) -> Answer:
-    """Check that the certified design is one of the job's."""
-    best, spec, place = evidence.job.best, evidence.spec, None
-    if isinstance(spec, JobSpec):
-        place = certified_at(spec, evidence.columns, certificate.spec)
-    if place is None:
-        return False, "its design is not one of this job"
-    is_best = best is not None and place == (best.iteration, best.particle)
-    what = "the best" if is_best else "not the best"
-    return True, f"it is of design {place_of(*place)}, {what}"
-
-
 def _check_run(
     members: Mapping[str, bytes],
-    found: _Found,
+    report: _Report,
     replay: int,
     drawn: np.random.Generator,
     certificate: str | None = None,
@@ -391,16 +298,63 @@ def _check_run(
     """Check one run; `certificate` is its id, None for the job itself."""
     evidence = read_evidence(members)
     rows = f"{len(evidence.columns)} evaluations in {len(evidence.asked)} iterations"
-    found.add("contents", True, f"{rows}, as in the spec", certificate)
-    for name, check in checks_of(evidence, members).items():
-        passed, detail = _tried(check)
-        found.add(name, passed, detail, certificate)
-    whose = "" if certificate is None else f"certificate {certificate}: "
-    found.provenance += [f"{whose}{change}" for change in changes_of_provenance(evidence)]
+    report.add("contents", (True, f"{rows}, as in the spec"), certificate)
+    checks: dict[str, Callable[[], Answer]] = {
+        "robot": lambda: _robot(evidence, members),
+        "fitness": lambda: _fitness(evidence),
+        "best": lambda: _best(evidence, members),
+        "designs": lambda: _designs(evidence),
+        "search": lambda: _search(evidence),
+        "chain": lambda: _chain(evidence),
+    }
+    if SUMMARY in members:
+        checks["summary"] = lambda: _summary(evidence, members)
     if replay:
-        passed, detail = _tried(lambda: _replay(evidence, found, replay, drawn, certificate))
-        found.add("replay", passed, detail, certificate)
+        checks["replay"] = lambda: _replay(evidence, report, replay, drawn, certificate)
+    for name, check in checks.items():
+        report.add(name, _tried(check), certificate)
+    whose = "" if certificate is None else f"certificate {certificate}: "
+    report.provenance += [f"{whose}{change}" for change in _explained_changes(evidence)]
     return evidence
+
+
+def _check_certificates(
+    job: Evidence, members: Mapping[str, bytes], report: _Report, replay: int, seed: int
+) -> None:
+    """Check every certificate in the evidence of a job."""
+    folders: dict[str, dict[str, bytes]] = {}
+    for name, content in members.items():
+        folder, _, rest = name.partition("/")
+        job_id, slash, member = rest.partition("/")
+        if folder == CERTIFICATES and slash:
+            folders.setdefault(job_id, {})[member] = content
+    for number, (job_id, own) in enumerate(sorted(folders.items())):
+        drawn = np.random.default_rng((seed, number))
+        try:
+            _check_certificate(job, job_id, own, report, replay, drawn)
+        except BadArchive as error:
+            report.add("contents", (False, str(error)), job_id)
+    if folders:
+        report.add("certificates", (True, f"{len(folders)} of designs of this job"))
+    elif isinstance(job.spec, JobSpec):
+        remedy = f"`gaitswarm certify {job.job.id}` makes one, and evidence written afterwards"
+        report.add("certificates", (None, f"there is none; {remedy} includes it"))
+
+
+def _check_certificate(
+    job: Evidence,
+    job_id: str,
+    members: Mapping[str, bytes],
+    report: _Report,
+    replay: int,
+    drawn: np.random.Generator,
+) -> None:
+    if SUMMARY not in members:
+        raise BadArchive(f"it has no {SUMMARY}")
+    certificate = _check_run(members, report, replay, drawn, job_id)
+    if certificate.job.id != job_id:
+        raise BadArchive(f"{JOB} is of another certificate than its folder")
+    report.add("design", _tried(lambda: _design(job, certificate)), job_id)
 
 
 def _tried(check: Callable[[], Answer]) -> Answer:
@@ -412,31 +366,254 @@ def _tried(check: Callable[[], Answer]) -> Answer:
         return False, f"cannot be computed: {type(error).__name__}: {str(error)[:200]}"
 
 
+def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+    """Check the robots' files against the digests of the provenance."""
+    content = b""
+    for number in range(len(evidence.spec.robot_sources)):
+        folder = f"robots/{number}"
+        for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
+            if name not in members:
+                return False, f"it has no {name}"
+            content += members[name]
+    expected = evidence.provenance.records[-1].provenance.simulation.robot_digest
+    if hashlib.sha256(content).hexdigest()[:_DIGITS] != expected:
+        return False, "the robot's files are not those that the provenance names"
+    return True, f"its files have the digest {expected} of the provenance"
+
+
+def _fitness(evidence: Evidence) -> Answer:
+    """Check that fitness follows from the raw objectives."""
+    tables = [(evidence.spec, evidence.columns)]
+    if evidence.reevaluated is not None:
+        tables.append((evidence.spec.in_double(), evidence.reevaluated))
+    wrong, count = 0, 0
+    for spec, columns in tables:
+        again = judged(spec, columns)
+        wrong += int((again.view(np.uint64) != columns.fitness.view(np.uint64)).sum())
+        count += len(columns)
+    if wrong:
+        return False, f"{wrong} of {count} do not follow from the raw objectives"
+    return True, f"{count} of {count} follow from the raw objectives, to the bit"
+
+
+def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+    """Check that the best design is the earliest of least fitness in double precision."""
+    best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
+    if best is None or said is None:
+        return best is None and said is None, "no design has succeeded in every case"
+    place, fitness = (best.iteration, best.particle), (best.reevaluation or best).fitness
+    if (said.iteration, said.particle, said.fitness) != (*place, fitness):
+        return False, f"design {place_of(*place)} is the best with {fitness!r}, not the named one"
+    shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
+    if parsed_json(members.get(BEST, b""), BEST) != shown:
+        return False, f"{BEST} does not show design {place_of(*place)}"
+    return True, f"design {place_of(*place)}, {fitness!r}, is the least of all"
+
+
+def _designs(evidence: Evidence) -> Answer:
+    """Check that designs correspond to the asks."""
+    designs = evidence.spec.design_space().designs(np.concatenate(evidence.asked))
+    wrong = int((designs != evidence.columns.designs).any(axis=1).sum())
+    if wrong:
+        return False, f"{wrong} of {len(designs)} are not what the search asked for"
+    return True, f"{len(designs)} of {len(designs)} are what the search asked for"
+
+
+def _search(evidence: Evidence) -> Answer:
+    """Check that the search proposes the same designs again."""
+    spec, lineage = evidence.spec, evidence.job.lineage
+    method = METHODS[spec.search.name]
+    if method.missing:
+        return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
+    columns = evidence.columns
+    results = spec.search_feedback(columns.objectives, columns.failed, columns.fitness)
+    ends = np.cumsum([len(positions) for positions in evidence.asked])
+    feedback = np.split(results, ends[:-1])
+    try:
+        retraced(spec, evidence.job.budgets, evidence.asked, feedback)
+    except ValueError as error:
+        if lineage is not None and lineage.carried == "search" and "preference" in lineage.changed:
+            return None, "its state was judged by another preference when it was forked"
+        return False, f"{error}: other code, another seed, or other results"
+    return True, f"{spec.search.name} proposes the same designs in {len(feedback)} iterations"
+
+
+def _chain(evidence: Evidence) -> Answer:
+    """Check the history against its digests."""
+    said, spec, again = evidence.chain, evidence.spec, evidence.reevaluated
+    if said.version != CHAIN_VERSION:
+        return None, f"it is of version {said.version}, which this gaitswarm does not compute"
+    lineage = None if said.lineage is None else Lineage.model_validate(said.lineage)
+    submitted = SPECS.validate_python(said.spec)
+    if (
+        spec not in (submitted, submitted.with_budget(spec.iterations))
+        or lineage != evidence.job.lineage
+        or RECORDS.validate_python(said.provenance or ()) != evidence.provenance.records
+    ):
+        return False, f"{CHAIN} has another spec, lineage or provenance than the rest of the file"
+    reevaluations = {} if again is None else dict(_reevaluations(again))
+    chain = Chain(ChainDocuments(said.spec, said.lineage, said.provenance), spec)
+    links = zip(evidence.asked, said.asks, said.digests, strict=True)
+    try:
+        for index, (positions, ask, digest) in enumerate(links):
+            columns = evidence.columns.of_iteration(index)
+            outcomes = Outcomes.read(columns, reevaluations.get(index))
+            chain.extend(Link(index, positions, ask, digest), outcomes)
+    except BrokenChain as error:
+        return False, str(error)
+    return _intact(chain.iterations, chain.head)
+
+
+def _reevaluations(columns: EvaluationColumns) -> Iterator[tuple[int, Reevaluation]]:
+    rows = zip(*columns.arrays, strict=True)
+    for iteration, particle, _, objectives, statuses, fitness in rows:
+        yield int(iteration), Reevaluation(int(particle), objectives, statuses, float(fitness))
+
+
+def _intact(iterations: int, head: str | None) -> Answer:
+    if head is None:
+        return None, "no iteration is committed yet"
+    return True, f"{iterations} iterations chained, head {head}"
+
+
+def _head(head: str, at: int | None, iterations: int) -> Answer:
+    """Check a history against a digest noted earlier."""
+    if at is None:
+        return False, f"no iteration has the digest {head}: this is a different history"
+    if at == iterations - 1:
+        return True, f"iteration {at}, the last, has the digest {head}"
+    since = iterations - 1 - at
+    return True, f"iteration {at} has the digest {head}; {since} more were committed since"
+
+
+def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+    """Check that a certificate's summary follows from its evaluations."""
+    spec = evidence.spec
+    if not isinstance(spec, CertificateSpec):
+        return False, f"a job of kind {spec.kind} has no {SUMMARY}"
+    view = certificate_view(evidence.job.id, spec, evidence.columns, most=WORST)
+    said = parsed_json(members[SUMMARY], SUMMARY)
+    where = next(_unequal(json.loads(view.model_dump_json()), said, ""), None)
+    if where is not None:
+        return False, f"{SUMMARY} has another {where} than follows from the evaluations"
+    return True, f"{SUMMARY} follows from {len(evidence.columns)} evaluations"
+
+
+def _unequal(here: Any, there: Any, path: str) -> Iterator[str]:
+    """Yield the paths at which two JSON documents differ."""
+    if isinstance(here, dict) and isinstance(there, dict) and here.keys() == there.keys():
+        for name in here:
+            yield from _unequal(here[name], there[name], f"{path}.{name}" if path else name)
+    elif isinstance(here, list) and isinstance(there, list) and len(here) == len(there):
+        for number, (ours, theirs) in enumerate(zip(here, there, strict=True)):
+            yield from _unequal(ours, theirs, f"{path}.{number}")
+    elif isinstance(here, float) and isinstance(there, float):
+        if not math.isclose(here, there, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE):
+            yield path
+    elif here != there:
+        yield path
+
+
+def _design(job: Evidence, certificate: Evidence) -> Answer:
+    """Check that the certified design is one of the job's."""
+    best, place = job.job.best, certified_place(job.spec, job.columns, certificate.spec)
+    if place is None:
+        return False, "its design is not one of this job"
+    is_best = best is not None and place == (best.iteration, best.particle)
+    return True, f"it is of design {place_of(*place)}, {'the best' if is_best else 'not the best'}"
+
+
+def _changes(spec: AnySpec, records: Iterable[ProvenanceRecord]) -> list[str]:
+    """Changes of provenance on this machine."""
+    here = job_provenance(spec)
+    return [
+        f"from iteration {record.from_iteration} on: {change}"
+        for record in records
+        for change in record.provenance.changes(here)
+    ]
+
+
+def _explained_changes(evidence: Evidence) -> list[str]:
+    """Changes of provenance on this machine, and what they mean."""
+    changes = _changes(evidence.spec, evidence.provenance.records)
+    if not changes:
+        return []
+    kernels = "the kernels' source differs from when the file was written: results may differ"
+    if kernels_of(evidence.spec) == evidence.provenance.kernels:
+        kernels = (
+            "the kernels' source is the same as when the file was written: physics and"
+            " control loop are the same, and the changes are outside of them"
+        )
+    replay = "equal bits in the replay show that these changes do not matter for what was replayed"
+    return [*changes, kernels, replay]
+
+
 def _replay(
     evidence: Evidence,
-    found: _Found,
-    replay: int,
+    report: _Report,
+    count: int,
     drawn: np.random.Generator,
     certificate: str | None,
 ) -> Answer:
-    """Check that drawn evaluations and the best one have the same bits here."""
-    spec, columns = evidence.spec, evidence.columns
-    refused = why_no_replay(spec)
+    """Repeat drawn evaluations and the best one."""
+    spec, columns, reevaluated = evidence.spec, evidence.columns, evidence.reevaluated
+    refused = _why_no_replay(spec)
     if refused is not None:
         return refused
-    repeatable = has_same_bits_anywhere(spec, columns)
-    chosen = drawn.permutation(np.flatnonzero(repeatable))[:replay]
-    row, judged = best_row(evidence)
-    best = chosen[:0]
-    if row is not None:
-        where = (int(judged.iteration[row]), int(judged.particle[row]))
-        at = np.array([row_of(columns, *where)])
-        best = at[repeatable[at]]
-    rows = np.unique(np.concatenate([chosen, best]))
-    tables = [(spec, columns.rows(rows))]
-    if evidence.reevaluated is not None and len(best):
-        tables.append((spec.in_double(), evidence.reevaluated.rows(np.array([row]))))
-    differences = simulated_differences(tables, evidence.recordings, certificate)
-    found.differences += differences
-    found.replayed += len(rows)
-    return replay_answer(len(rows), len(best) > 0, spec, differences)
+    rows, best = drawn.permutation(len(columns))[:count], best_of(columns, reevaluated)
+    chosen = None
+    if best is not None:
+        place, again = (best.iteration, best.particle), None
+        rows = np.append(rows, row_of(columns, place))
+        if reevaluated is not None:
+            again = reevaluated.rows(np.array([row_of(reevaluated, place)]))
+        chosen = (place, again)
+    repeated = columns.rows(np.unique(rows))
+    return report.replay(spec, repeated, chosen, evidence.recordings, certificate)
+
+
+def _why_no_replay(spec: AnySpec) -> Answer | None:
+    """Explain why evaluations of a job cannot be replayed here; None if they can."""
+    if isinstance(spec, JobSpec) and spec.case is not None:
+        name = spec.case.name
+        return None, f"designs were evaluated by the plug-in {name}, which may give other bits"
+    if provenance_of(*spec.robot_sources, precision=spec.precision).backend == "reference":
+        return False, (
+            "there is no C compiler here: the interpreter gives other bits, and takes some hundred"
+            " times as long"
+        )
+    return None
+
+
+def _differences(
+    tables: Sequence[tuple[AnySpec, EvaluationColumns]],
+    recordings: Recordings,
+    certificate: str | None,
+) -> Iterator[DifferenceView]:
+    """Simulate evaluations and yield differences of any bit."""
+    for spec, columns in tables:
+        designs = spec.design_space().simulated(columns.designs)
+        outcomes = evaluated(spec.cases(recordings), designs, spec.robot_sources, spec.precision)
+        for number, (case, outcome) in enumerate(zip(spec.case_names, outcomes, strict=True)):
+            stored, statuses = columns.objectives[:, number], columns.statuses[:, number]
+            here = np.where(np.isfinite(outcome.objectives), outcome.objectives, np.nan)
+            same = (stored == here) & (np.signbit(stored) == np.signbit(here))
+            same |= np.isnan(stored) & np.isnan(here)
+            found: list[tuple[int, str, float | str | None, float | str | None]] = [
+                (row, spec.objectives[k].name, finite(stored[row, k]), finite(here[row, k]))
+                for row, k in np.argwhere(~same).tolist()
+            ]
+            found += [
+                (row, "status", Status(statuses[row]).label, Status(outcome.statuses[row]).label)
+                for row in np.flatnonzero(statuses != outcome.statuses).tolist()
+            ]
+            for row, what, before, now in found:
+                yield DifferenceView(
+                    iteration=int(columns.iteration[row]),
+                    particle=int(columns.particle[row]),
+                    case=case,
+                    what=what,
+                    stored=before,
+                    simulated=now,
+                    certificate=certificate,
+                )

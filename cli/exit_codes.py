@@ -5,7 +5,7 @@
 2    invalid usage or input; the message names the option, file or field
 3    no such job, iteration, database or result
 4    not possible in the job's current state
-5    server, database, workers, compiler, files or standard output unavailable
+5    server, database, workers, compiler, files, memory or standard output unavailable
 6    permission denied; the message names the required token
 70   a bug; the traceback shows where
 130  interrupted
@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import errno
+import re
 from enum import IntEnum
 from typing import Final
 
@@ -54,8 +55,25 @@ _SYSTEM_ERRORS: Final = frozenset(
 """Refusals of the file system or operating system that no program can avoid."""
 
 
+_MEMORY: Final = re.compile(
+    "failed to map segment|[Cc]annot allocate memory|can't start new thread|Unable to allocate"
+)
+"""What libraries report in place of a MemoryError."""
+
+
+def _lacks_memory(error: BaseException | None) -> bool:
+    while error is not None:
+        if isinstance(error, MemoryError) or _MEMORY.search(str(error)):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
 def exit_code(error: BaseException) -> ExitCode | None:
     """Return the exit code of an expected error; None for a bug."""
+    if _lacks_memory(error):
+        # Nothing more can be imported.
+        return ExitCode.UNAVAILABLE
     from gaitswarm.services.optimizer import errors
     from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
@@ -82,6 +100,8 @@ def exit_code(error: BaseException) -> ExitCode | None:
 
 def explanation(error: BaseException) -> str:
     """Return an error's message, followed by its notes with remedies."""
+    if _lacks_memory(error):
+        return "out of memory (or of threads): end other programs, or raise the limits"
     message = str(error)
     if isinstance(error, OSError):
         message = ": ".join(str(part) for part in (error.filename, error.strerror) if part)

@@ -170,7 +170,7 @@ def database_to_write(settings: Settings) -> str:
     if settings.db is None:
         folder = Path(settings.database).parent
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise StoreUnavailable(
                 f"cannot make {folder} for the database: {error.strerror}; name another place with"

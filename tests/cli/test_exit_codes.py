@@ -147,6 +147,9 @@ def test_a_bug_is_exit_code_70_with_its_traceback(
         (OSError(28, "No space left on device", "/data/jobs.db"), "/data/jobs.db: No space left"),
         (PermissionError(13, "Permission denied", "/data"), "/data: Permission denied"),
         (StoreUnavailable("the database is away"), "the database is away"),
+        (MemoryError(), "out of memory"),
+        (RuntimeError("can't start new thread"), "out of memory (or of threads)"),
+        (ImportError("x.so: failed to map segment from shared object"), "out of memory"),
     ],
 )
 def test_refusals_of_the_operating_system_are_no_bugs(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+import stat
 import subprocess
 import threading
 from contextlib import ExitStack
@@ -19,6 +21,7 @@ from gaitswarm.services.optimizer.store.engine import Database, parse_url
 from gaitswarm.services.optimizer.store.schema import MIGRATIONS, head, lock_for_migration
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import loaded_by, output
+from tests.optimizer.formula import SPEC
 from tests.store import worker_process
 from tests.store.examples import LEASE, spec
 
@@ -107,9 +110,29 @@ def test_a_store_whose_database_lost_its_schema_says_so(fresh_url: str) -> None:
     store.close()
 
 
+def test_another_programs_file_is_left_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "theirs.db"
+    edit(str(file), "CREATE TABLE notes (id TEXT)")
+    before = file.read_bytes()
+    with pytest.raises(StoreUnavailable, match=r"is of another program: .*notes; name another"):
+        open_store(str(file))
+    assert file.read_bytes() == before
+
+
+def test_a_new_file_is_its_users_alone(tmp_path: Path) -> None:
+    umask = os.umask(0o022)
+    try:
+        store = open_store(str(tmp_path / "jobs.db"))
+        store.create_job(SPEC)
+        assert {stat.S_IMODE(file.stat().st_mode) for file in tmp_path.iterdir()} == {0o600}
+        store.close()
+    finally:
+        os.umask(umask)
+
+
 def test_another_programs_tables_are_not_taken_over(fresh_url: str) -> None:
     edit(fresh_url, "CREATE TABLE jobs (id TEXT)")
-    with pytest.raises(StoreUnavailable, match=r"jobs.*already exists"):
+    with pytest.raises(StoreUnavailable, match=r"jobs.*already exists|is of another program"):
         open_store(fresh_url)
     edit(fresh_url, "INSERT INTO jobs VALUES ('theirs')")
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import threading
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -102,9 +103,12 @@ def _require_known(revision: str, name: str) -> None:
 def create(url: sa.URL) -> None:
     """Create the tables of an empty database, by one of several processes at once.
 
-    Raises StoreUnavailable for a database that cannot be opened or has an older schema.
+    Raises StoreUnavailable for a database that cannot be opened or has an older schema, and for an
+    SQLite file of another program.
     """
     with closing(Database(url, for_migration=True)) as database:
+        if database.path is not None:
+            _create_file(database.path)
         # An existing database needs no write lock.
         with database.read() as connection:
             revision = read_revision(connection)
@@ -114,10 +118,23 @@ def create(url: sa.URL) -> None:
         with _explained_errors(database), database.write() as connection:
             lock_for_migration(connection)
             if read_revision(connection) is None:
+                others = sa.inspect(connection).get_table_names()
+                if others and database.path is not None:
+                    raise StoreUnavailable(
+                        f"database {database.name} is of another program: it has the tables"
+                        f" {', '.join(others[:5])}; name another file"
+                    )
                 # Migrating, and importing Alembic, takes ten times as long.
                 metadata.create_all(connection, checkfirst=False)
                 _alembic_version.create(connection)
                 connection.execute(_alembic_version.insert().values(version_num=head()))
+
+
+def _create_file(path: Path) -> None:
+    """Create an SQLite file that only this user can read, unless there is one."""
+    # SQLite gives its log the same permissions. It says why a file cannot be created.
+    with suppress(OSError):
+        os.close(os.open(path, os.O_CREAT | os.O_RDWR, 0o600))
 
 
 def upgrade(url: str) -> str | None:

@@ -92,7 +92,7 @@ class RecordingEntryView(View):
             joints=entry.joints,
             rows=entry.rows,
             rate=1.0 / CONTROL_PERIOD,
-            seconds=None if entry.rows is None else entry.rows * CONTROL_PERIOD,
+            seconds=entry.rows * CONTROL_PERIOD,
             size=entry.size,
             synthetic=entry.synthetic,
         )

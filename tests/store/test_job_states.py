@@ -145,7 +145,7 @@ def test_a_runner_that_stops_leaves_the_job_in_the_state_asked_for(
     store.release(claim, released_as, error="why\0" if state is JobState.FAILED else None)
     job = store.job(claim.job.id)
     assert job.state is state
-    assert job.error == ("why" if state is JobState.FAILED else None)
+    assert job.error == ("why\N{REPLACEMENT CHARACTER}" if state is JobState.FAILED else None)
 
 
 def test_a_runner_cannot_release_a_job_as_succeeded(store: Store) -> None:

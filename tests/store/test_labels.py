@@ -9,6 +9,7 @@ from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange, robot_name
 from gaitswarm.services.optimizer.store import Store
+from gaitswarm.sim.robot.variant import RobotFiles
 from tests.examples.walks import quadruped_files
 from tests.store.examples import Clock
 
@@ -89,7 +90,7 @@ def test_a_robot_of_ones_own_is_found_by_its_name_and_as_one_of_all(store: Store
 
 @pytest.mark.parametrize("name", ["name = ", "name = 3", "x = 1", 'name = ""', "x = " + "[" * 5000])
 def test_a_robot_without_a_name_is_called_own(name: str) -> None:
-    assert robot_name({"toml": name, "urdf": ""}) == "own"
+    assert robot_name(RobotFiles.model_construct(toml=name, urdf="")) == "own"
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-created")

@@ -10,51 +10,24 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import Connection, text
 
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
-from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, JobOrder
-from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.optimizer.store import schema as schema_module
-from gaitswarm.services.optimizer.store.engine import Database, parse_url
+from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.services.optimizer.store.schema import (
     MIGRATIONS,
-    create,
     exclusive,
     head,
     read_revision,
     upgrade,
 )
-from gaitswarm.services.optimizer.store.tables import metadata
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 from tests.store import worker_process
 from tests.store.examples import spec
-from tests.store.first_schema import create_first_schema
 from tests.store.test_opening import edit
-
-
-def schema(connection: Connection) -> list[str]:
-    """Every table, column and index, in the words of the database itself."""
-    if connection.dialect.name == "sqlite":
-        return sorted(" ".join(row.sql.split()) for row in connection.execute(_SQLITE_SCHEMA))
-    return [str(row) for query in _POSTGRESQL_SCHEMA for row in connection.execute(query)]
-
-
-_SQLITE_SCHEMA = text("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")
-_POSTGRESQL_SCHEMA = [
-    text(
-        "SELECT table_name, column_name, data_type, is_nullable, column_default, is_identity"
-        " FROM information_schema.columns WHERE table_schema = 'public'"
-        " ORDER BY table_name, ordinal_position"
-    ),
-    text("SELECT indexdef FROM pg_indexes WHERE schemaname = 'public' ORDER BY indexname"),
-    text(
-        "SELECT conrelid::regclass, conname, pg_get_constraintdef(oid) FROM pg_constraint"
-        " WHERE connamespace = 'public'::regnamespace ORDER BY conrelid::regclass::text, conname"
-    ),
-]
 
 
 def store_job(url: str) -> str:
@@ -77,7 +50,6 @@ def release_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[]
     return release
 
 
-FIRST = "0020"
 NEWEST = head()
 NEXT = f"{int(NEWEST) + 1:04}"
 _NEXT_MIGRATION = f"""
@@ -100,62 +72,15 @@ def revision(url: str) -> str | None:
         return read_revision(connection)
 
 
-def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
-    with closing(Database(fresh_url, for_migration=True)) as database:
-        with database.write() as connection:
-            create_first_schema(connection)
-        assert upgrade(fresh_url) == FIRST
-        with database.write() as connection:
-            migrated, revision = schema(connection), read_revision(connection)
-            metadata.drop_all(connection)
-            connection.execute(text("DROP TABLE alembic_version"))
-            assert schema(connection) == []
-        create(parse_url(fresh_url))
-        with database.read() as connection:
-            assert len(migrated) > len(metadata.tables)
-            assert schema(connection) == migrated
-            assert read_revision(connection) == revision == head()
-    with closing(open_store(fresh_url)) as store:
-        job, _ = store.create_job(spec())
-        assert store.jobs().items[0].id == job.id
-
-
-def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searched_by(
-    fresh_url: str,
-) -> None:
-    store_job(fresh_url)
-    with closing(open_store(fresh_url)) as store:
-        job, _ = store.create_job(spec(name="Größe"))
-        store.label(job.id, LabelsChange(note="Look HERE", tags=("thesis",)))
-    # The first revision has neither the journal, nor these columns and an index with them.
-    with (
-        closing(Database(fresh_url, for_migration=True)) as database,
-        database.write() as connection,
-    ):
-        if connection.dialect.name == "sqlite":
-            connection.execute(text("DROP INDEX ix_jobs_entries"))
-            connection.execute(text("CREATE INDEX ix_jobs_entries ON jobs (id)"))
-        connection.execute(text("DROP TABLE journal"))
-        for column in ("sort_name", "search_text", "evaluated_on"):
-            connection.execute(text(f"ALTER TABLE jobs DROP COLUMN {column}"))
-        connection.execute(text("UPDATE alembic_version SET version_num = '0020'"))
-    assert upgrade(fresh_url) == FIRST
-    with closing(open_store(fresh_url)) as store:
-        assert len(store.jobs().items) == 2
-        for words in ("grösse", "here", "THESIS", job.id):
-            assert [found.id for found in store.jobs(search=words).items] == [job.id]
-        assert store.jobs(order=JobOrder.NAME).items[0].id == job.id
-
-
 @pytest.mark.parametrize("opened", [open_store, upgrade])
 def test_a_database_of_a_version_before_the_first_release_is_refused(
     fresh_url: str, opened: Callable[[str], object]
 ) -> None:
     store_job(fresh_url)
-    edit(fresh_url, "UPDATE alembic_version SET version_num = '0019'")
-    with pytest.raises(StoreUnavailable, match=r"0019 .* before 0\.1\.0.*name another database"):
+    edit(fresh_url, "UPDATE alembic_version SET version_num = '0023'")
+    with pytest.raises(StoreUnavailable, match=r"0023 .* before 0\.1\.0.*name another database"):
         opened(fresh_url)
-    assert revision(fresh_url) == "0019"
+    assert revision(fresh_url) == "0023"
 
 
 def test_an_older_database_is_refused_and_left_as_it_is(

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Preference,
+    PreferenceChoice,
+)
 from gaitswarm.sim.input import Line, Lines
-from gaitswarm.sim.robot.variant import SHIPPED
+from gaitswarm.sim.robot.variant import SHIPPED, RobotFiles, RobotSource, RobotVariant
 
 OWN: Final = "own"
 """Facet value of custom preferences and unnamed robots."""
@@ -79,38 +82,8 @@ class JobFilter:
     preference: str | None = None
     tag: str | None = None
 
-    @property
-    def needs_specs(self) -> bool:
-        """Whether it filters by more than `archived`."""
-        return any((self.robot, self.controller, self.preference, self.tag))
-
-    def admits(self, facets: Facets) -> bool:
-        """Return whether a job with these facets passes.
-
-        Args:
-            facets: Of the job.
-        """
-        criteria = (self.robot, self.controller, self.preference)
-        robot = OWN if self.robot == OWN and facets.own_robot else facets.robot
-        values = (robot, facets.controller, facets.preference)
-        return all(w is None or w == f for w, f in zip(criteria, values, strict=True)) and (
-            self.tag is None or self.tag in facets.tags
-        )
-
 
 ANY_JOB: Final = JobFilter()
-
-
-@dataclass(frozen=True, slots=True)
-class Facets:
-    """Properties by which a job is found."""
-
-    state: str
-    robot: str | None = None  # None if unnamed or unreadable
-    controller: str | None = None  # None for a job that tunes none
-    preference: str | None = None  # name, `own` for any other; None for none
-    tags: tuple[str, ...] = ()
-    own_robot: bool = False  # whether the robot is custom
 
 
 @dataclass(slots=True)
@@ -124,36 +97,33 @@ class FacetCounts:
     preferences: Counter[str] = field(default_factory=Counter)
     tags: Counter[str] = field(default_factory=Counter)
 
-    def add(self, facets: Facets) -> None:
+    def add(
+        self,
+        state: str,
+        robot: str | None,
+        controller: str | None,
+        preference: str | None,
+        *,
+        tags: Iterable[str],
+    ) -> None:
+        """Count a job; a robot without a name, and a job without a preference, have None."""
         self.total += 1
-        self.states[facets.state] += 1
+        self.states[state] += 1
         for counter, value in (
-            (self.robots, facets.robot),
-            (self.controllers, facets.controller),
-            (self.preferences, facets.preference),
+            (self.robots, robot),
+            (self.controllers, controller),
+            (self.preferences, preference),
         ):
             if value is not None:
                 counter[value] += 1
-        self.tags.update(facets.tags)
+        self.tags.update(tags)
 
 
-def robot_name(robot: Any) -> str | None:
-    """Return the name of a spec's robot."""
-    document = _parsed(robot)
-    if is_own_robot(document):
-        return _name_in(str(_part(document, "toml")))
-    if document is None or isinstance(document, str):
-        return document or None
-    return str(_part(document, "name") or OWN)
-
-
-def is_own_robot(robot: Any) -> bool:
-    """Return whether a spec's robot is custom."""
-    return _part(_parsed(robot), "toml") is not None
-
-
-def _part(robot: Any, name: str) -> Any:
-    return robot.get(name) if isinstance(robot, Mapping) else getattr(robot, name, None)
+def robot_name(robot: RobotSource | None) -> str | None:
+    """Return the name of a spec's robot; `own` for a custom one without a name of its own."""
+    if isinstance(robot, RobotFiles):
+        return _name_in(robot.toml)
+    return robot.name if isinstance(robot, RobotVariant) else robot
 
 
 @lru_cache(maxsize=256)
@@ -166,23 +136,8 @@ def _name_in(toml: str) -> str:
     return name if isinstance(name, str) and name and name not in SHIPPED else OWN
 
 
-def preference_name(preference: Any) -> str | None:
-    """Return the name of a spec's preference."""
-    document = _parsed(preference)
-    if not document:
-        return None
-    if isinstance(document, str):
-        return document if document in PREFERENCES else OWN
-    document = document if isinstance(document, Mapping) else vars(document)
-    numbers = tuple(tuple(document.get(part) or ()) for part in ("bias", "exponent"))
-    return next((n for n, p in PREFERENCES.items() if (p.bias, p.exponent) == numbers), OWN)
-
-
-def _parsed(value: Any) -> Any:
-    """Parse a JSON document; return any other value unchanged."""
-    if isinstance(value, str) and value.startswith("{"):
-        try:
-            return json.loads(value)
-        except ValueError:
-            return None
-    return value
+def preference_name(preference: PreferenceChoice | None) -> str | None:
+    """Return the name of a spec's preference; `own` for a custom one."""
+    if not isinstance(preference, Preference):
+        return preference
+    return next((name for name, shipped in PREFERENCES.items() if shipped == preference), OWN)

@@ -1,11 +1,15 @@
-"""Pages of lists, and entries that are not jobs"""
+"""Pages and cursors of lists, and entries that are not jobs"""
 
 from __future__ import annotations
 
+import json
+import math
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Final, Generic, TypeVar
+from datetime import UTC, datetime, timedelta
+from typing import Any, Final, Generic, TypeVar
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
@@ -13,6 +17,8 @@ from gaitswarm.services.optimizer.jobs.job import JobState
 T = TypeVar("T")
 
 _LARGEST_PAGE: Final = 10_000
+
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,15 +41,15 @@ class Queue:
 
 @dataclass(frozen=True, slots=True)
 class RecordingEntry:
-    """A recorded walk in a list. What follows `size` is None if the walk is unreadable."""
+    """A recorded walk in a list."""
 
     id: str
     created_at: datetime
     size: int  # of the stored document, in characters
-    scenario: str | None
-    controller: str | None
-    joints: int | None  # number of joints with currents
-    rows: int | None  # number of control ticks
+    scenario: str
+    controller: str
+    joints: int  # number of joints with currents
+    rows: int  # number of control ticks
     synthetic: bool  # whether it was computed, not measured
 
 
@@ -52,3 +58,42 @@ def checked_limit(limit: int) -> int:
     if limit < 1:
         raise InvalidRequest("a page holds at least one item", field="limit")
     return min(limit, _LARGEST_PAGE)
+
+
+def folded(text: str) -> str:
+    """Return a text in a form that is compared in any case."""
+    return storable(text.casefold())
+
+
+def storable(text: str) -> str:
+    """Replace characters that a database refuses."""
+    text = text.replace("\0", "\N{REPLACEMENT CHARACTER}")
+    return text.encode("utf-8", "replace").decode()
+
+
+def to_cursor(order: str, value: Any, item_id: str) -> str:
+    """Return the place of an item in a list sorted by a value and then by id."""
+    if isinstance(value, datetime):
+        value = (value - _EPOCH) // timedelta(microseconds=1)
+    return f"{order}:{json.dumps(value)}:{item_id}"
+
+
+def from_cursor(order: str, text: str, kind: type) -> tuple[Any, str]:
+    """Return value and id of an item, the inverse of `to_cursor`. Raises InvalidRequest.
+
+    kind: of the value: datetime, float or str; it may also be None.
+    """
+    match = re.fullmatch(rf"{re.escape(order)}:(.*):([0-9a-z]{{12,32}})", text)
+    with suppress(ValueError, OverflowError, RecursionError):
+        if match is not None:
+            value, item_id = json.loads(match[1]), match[2]
+            if value is None or (kind is str and isinstance(value, str)):
+                return None if value is None else folded(value), item_id
+            if kind is datetime and type(value) is int:
+                return _EPOCH + timedelta(microseconds=value), item_id
+            if kind is float and type(value) in (int, float) and math.isfinite(value):
+                return float(value), item_id
+    raise InvalidRequest(
+        "not a cursor of this list in this order; pass the `next` of the page before",
+        field="after",
+    )

@@ -9,11 +9,11 @@ from typing import Final, Literal
 import numpy as np
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.labels import is_own_robot
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.sim.robot.variant import RobotFiles
 
 ReferenceKind = Literal["published", "start"]
 
@@ -45,7 +45,7 @@ def published_for(spec: Spec) -> tuple[str, Mapping[str, float]] | None:
     if not isinstance(spec, JobSpec) or spec.case is not None:
         return None
     study = published_study(spec)
-    if study is None or is_own_robot(spec.robot):
+    if study is None or isinstance(spec.robot, RobotFiles):
         return None
     return study, adapted_to_job(CONTROLLERS[spec.controller].published[study], spec)
 
@@ -55,7 +55,9 @@ def start_of(spec: Spec) -> Mapping[str, float] | None:
 
     Custom robots have no published design; this one shows the gain of the search.
     """
-    if not isinstance(spec, JobSpec) or spec.case is not None or not is_own_robot(spec.robot):
+    if not isinstance(spec, JobSpec) or spec.case is not None:
+        return None
+    if not isinstance(spec.robot, RobotFiles):
         return None
     space = spec.design_space()
     middle = space.designs(np.array([(space.low + space.high) / 2.0]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from itertools import islice
 from typing import Any, Final
 
 from sqlalchemy import (
@@ -25,26 +24,23 @@ from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.job import ENDED, Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import (
     ANY_JOB,
+    OWN,
     FacetCounts,
-    Facets,
     JobFilter,
-    is_own_robot,
-    preference_name,
-    robot_name,
 )
-from gaitswarm.services.optimizer.jobs.listing import Page, Queue, checked_limit
-from gaitswarm.services.optimizer.store.engine import Aggregate
-from gaitswarm.services.optimizer.store.job_rows import SHOWN, is_job_id, shown_job
-from gaitswarm.services.optimizer.store.queries import (
+from gaitswarm.services.optimizer.jobs.listing import (
+    Page,
+    Queue,
+    checked_limit,
     folded,
     from_cursor,
-    number_at,
-    text_at,
+    storable,
     to_cursor,
 )
+from gaitswarm.services.optimizer.store.engine import Aggregate
+from gaitswarm.services.optimizer.store.job_rows import SHOWN, is_job_id, shown_job
 from gaitswarm.services.optimizer.store.tables import EXISTING, jobs
-
-_KINDS: Final = ("tuning", "certificate", "identification", "calibration")
+from gaitswarm.sim.robot.variant import SHIPPED
 
 _ERROR_LENGTH: Final = 300
 
@@ -83,25 +79,22 @@ class JobList(Aggregate):
         cursor = f"-{order}" if reverse else str(order)
         kinds: dict[JobOrder, type] = {JobOrder.CREATED: datetime, JobOrder.NAME: str}
         last = None if after is None else from_cursor(cursor, after, kinds.get(order, float))
-        conditions = _existing(where.archived)
+        conditions = _conditions(where)
         if state is not None:
             conditions.append(jobs.c.state == state)
         if parent is not None:
             conditions.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
         if search:
             conditions.append(jobs.c.search_text.contains(folded(search), autoescape=True))
+        if kind is not None:
+            conditions.append(jobs.c.kind == kind)
         with self._database.read("jobs") as connection:
-            if kind is not None:
-                conditions.append(text_at(connection, jobs.c.spec, "kind") == kind)
             key = _key(connection, order)
             rows = list[Any]()
             descending = reverse is not (order is JobOrder.CREATED)
             for ids, place in _pages(conditions, key, last, descending):
-                most = limit + 1 - len(rows)
                 # Only ids are sorted and filtered: specs may be large.
-                page: Any = ids.limit(most)
-                if where.needs_specs:
-                    page = _filtered(connection, ids, where, most)
+                page = ids.limit(limit + 1 - len(rows))
                 shown = select(*SHOWN, key.label("sort_key")).where(jobs.c.id.in_(page))
                 rows += connection.execute(shown.order_by(*place)).all()
                 if len(rows) > limit:
@@ -118,10 +111,12 @@ class JobList(Aggregate):
             archived: only jobs that are archived, or that are not; None for both.
         """
         counts = FacetCounts()
+        table = jobs.c
+        columns = (table.state, table.robot, table.controller, table.preference, table.tags)
+        query = select(*columns).where(*_conditions(JobFilter(archived=archived)))
         with self._database.read("facets") as connection:
-            query = select(*_facet_columns(connection)).where(*_existing(archived))
-            for row in connection.execute(query):
-                counts.add(_facets(*row))
+            for *values, tags in connection.execute(query):
+                counts.add(*values, tags=(tags or "").split("\n")[1:-1])
         return counts
 
     def queue(self) -> Queue:
@@ -131,13 +126,12 @@ class JobList(Aggregate):
             numbers = select(jobs.c.state, func.count()).where(EXISTING).group_by(jobs.c.state)
             by_state = dict.fromkeys(JobState, 0)
             by_state |= {JobState(state): count for state, count in connection.execute(numbers)}
-            kind = text_at(connection, jobs.c.spec, "kind").label("kind")
-            unfinished = select(jobs.c.state, kind, func.count()).group_by(jobs.c.state, kind)
-            under_way: dict[tuple[JobState, str], int] = {}
+            state_and_kind = (jobs.c.state, jobs.c.kind)
+            unfinished = select(*state_and_kind, func.count()).group_by(*state_and_kind)
             query = unfinished.where(jobs.c.state.not_in(ENDED), EXISTING)
-            for state, name, count in connection.execute(query):
-                key = (JobState(state), name if name in _KINDS else "unknown")
-                under_way[key] = under_way.get(key, 0) + count
+            under_way = {
+                (JobState(state), kind): count for state, kind, count in connection.execute(query)
+            }
             queued = (jobs.c.state == JobState.QUEUED, EXISTING)
             since = connection.execute(select(func.min(jobs.c.updated_at)).where(*queued)).scalar()
             beginning = func.substr(func.coalesce(jobs.c.error, ""), 1, _ERROR_LENGTH)
@@ -147,10 +141,23 @@ class JobList(Aggregate):
         return Queue(by_state, under_way, wait, errors)
 
 
-def _existing(archived: bool | None) -> list[ColumnElement[bool]]:
-    if archived is None:
-        return [EXISTING]
-    return [EXISTING, func.coalesce(jobs.c.archived, False).is_(archived)]
+def _conditions(where: JobFilter) -> list[ColumnElement[bool]]:
+    conditions: list[ColumnElement[bool]] = [EXISTING]
+    if where.archived is not None:
+        conditions.append(jobs.c.archived.is_(where.archived))
+    if where.robot == OWN:
+        conditions.append(jobs.c.robot.not_in(SHIPPED))
+    elif where.robot is not None:
+        conditions.append(jobs.c.robot == storable(where.robot))
+    if where.controller is not None:
+        conditions.append(jobs.c.controller == storable(where.controller))
+    if where.preference is not None:
+        conditions.append(jobs.c.preference == storable(where.preference))
+    if where.tag is not None:
+        # Unlike LIKE, this tells capital letters apart in both databases.
+        without = func.replace(jobs.c.tags, f"\n{storable(where.tag)}\n", "")
+        conditions.append(without != jobs.c.tags)
+    return conditions
 
 
 def _pages(
@@ -177,41 +184,17 @@ def _pages(
         yield unvalued, [jobs.c.id]
 
 
-def _filtered(connection: Connection, ids: Select[Any], where: JobFilter, most: int) -> list[str]:
-    """Return ids that pass a filter; custom robots and preferences have no columns."""
-    rows = connection.execute(ids.add_columns(*_facet_columns(connection)))
-    matches = (row[0] for row in rows if where.admits(_facets(*row[1:])))
-    return list(islice(matches, most))
-
-
-def _facet_columns(connection: Connection) -> list[ColumnElement[Any]]:
-    names = ("robot", "controller", "preference")
-    return [jobs.c.state, jobs.c.labels, *(text_at(connection, jobs.c.spec, n) for n in names)]
-
-
-def _facets(state: str, labels: Any, robot: str, controller: str, preference: str) -> Facets:
-    return Facets(
-        state,
-        robot_name(robot),
-        controller or None,
-        preference_name(preference),
-        tuple(labels.get("tags", ()) if isinstance(labels, dict) else ()),
-        own_robot=is_own_robot(robot),
-    )
-
-
 def _key(connection: Connection, order: JobOrder) -> ColumnElement[Any]:
     """Return the value to sort by; NULL if a job has none."""
     if order is JobOrder.TIME_LEFT:
         return _time_left(connection)
     if order is JobOrder.GAIN:
         # The negative of `Job.gain`.
-        reference = number_at(connection, jobs.c.reference, "fitness")
+        reference = jobs.c.reference_fitness
         return jobs.c.best_fitness / case((reference > 0.0, reference)) - 1.0
     if order is JobOrder.RATE:
-        taken_over = func.coalesce(number_at(connection, jobs.c.lineage, "evaluations"), 0.0)
-        own, seconds = jobs.c.evaluations - taken_over, jobs.c.compute_seconds
-        return -case((and_(own > 0.0, seconds > 0.0), own / case((seconds > 0.0, seconds))))
+        own, seconds = jobs.c.evaluations - jobs.c.evaluations_taken, jobs.c.compute_seconds
+        return -case((and_(own > 0, seconds > 0.0), own / case((seconds > 0.0, seconds))))
     if order is JobOrder.STATE:
         return case({str(state): k for k, state in enumerate(JobState)}, value=jobs.c.state)
     keys: dict[JobOrder, ColumnElement[Any]] = {

@@ -6,7 +6,7 @@ import json
 import re
 import secrets
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from datetime import datetime
 from functools import lru_cache
 from typing import Any, Final
@@ -48,30 +48,20 @@ _LARGE_SPEC: Final = 65_536
 
 _DOCUMENTS: Final = ("spec", "provenance", "lineage")
 
-_SAME_NAME: Final = (
-    *("id", "created_at", "updated_at", "started_at", "finished_at", "error", "owner", "waiting"),
-    "priority",
+_SAME_NAME: Final = tuple(
+    field.name
+    for field in fields(Job)
+    if field.name in jobs.c and field.name not in (*_DOCUMENTS, "state", "labels")
 )
 """Columns that are fields of `Job`."""
 
-_PROGRESS: Final = (
-    *("iterations", "evaluations", "best_fitness", "best_iteration", "best_particle"),
-    *("compute_seconds", "recent_seconds", "head"),
-)
+_PROGRESS: Final = tuple(field.name for field in fields(Progress))
 """Columns that are fields of `Progress`."""
 
-_UNSHOWN: Final = frozenset(
-    {
-        *("idempotency_key", "request_digest", "lease_owner", "lease_token", "lease_expires_at"),
-        *("parent_id", "crashes", "notify_url", "deleted_at", "simulated_seconds"),
-        *("sort_name", "search_text"),
-    }
-)
-
-SHOWN: Final = tuple(
-    cast(column, Text).label(column.name) if column.name in _DOCUMENTS else column
-    for column in jobs.c
-    if column.name not in _UNSHOWN
+SHOWN: Final = (
+    *(cast(jobs.c[name], Text).label(name) for name in _DOCUMENTS),
+    *(jobs.c[name] for name in (*_SAME_NAME, *_PROGRESS, "state", "labels", "budget")),
+    *(jobs.c[f"reference_{field.name}"] for field in fields(Reference)),
 )
 """Columns of `shown_job`."""
 
@@ -184,19 +174,14 @@ def to_job(row: Row, documents: _Documents | None = None) -> Job:
         **{name: row[name] for name in _SAME_NAME},
         stored_spec=spec,
         state=JobState(row["state"]),
-        progress=Progress(
-            evaluations_saved=row["evaluations_saved"] or 0,
-            **{name: row[name] for name in _PROGRESS},
-        ),
+        progress=Progress(**{name: row[name] for name in _PROGRESS}),
         provenance=provenance,
-        accepts_changes=bool(row["accepts_changes"]),
         lineage=lineage,
-        kept=bool(row["kept"]),
         submitted_iterations=submitted_iterations,
         labels=labels_of(row),
-        archived=bool(row["archived"]),
-        reference=_reference(row["reference"]),
-        evaluated_on=row["evaluated_on"],
+        reference=None
+        if row["reference_kind"] is None
+        else Reference(row["reference_name"], row["reference_fitness"], row["reference_kind"]),
     )
 
 
@@ -286,17 +271,6 @@ def labels_of(row: Row) -> Labels:
         return Labels()
 
 
-def _reference(document: Any) -> Reference | None:
-    if not isinstance(document, dict):
-        return None
-    name, fitness = document.get("name"), document.get("fitness")
-    return Reference(
-        name if isinstance(name, str) else None,
-        float(fitness) if isinstance(fitness, int | float) else None,
-        "start" if document.get("kind") == "start" else "published",
-    )
-
-
 def chain_documents(row: Row) -> ChainDocuments:
     """Return the documents of a job's chain as stored, readable or not."""
     return ChainDocuments(row["spec"], row["lineage"], row["provenance"])
@@ -304,8 +278,3 @@ def chain_documents(row: Row) -> ChainDocuments:
 
 def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:
     return [record.model_dump(mode="json") for record in records]
-
-
-def storable(text: str) -> str:
-    """Return a text without zero bytes, which PostgreSQL refuses."""
-    return text.replace("\0", "")

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Any, Final
 
-from sqlalchemy import Connection, Table, delete, exists, func, insert, select, update
+from sqlalchemy import Connection, Table, delete, exists, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import (
@@ -32,7 +32,13 @@ from gaitswarm.services.optimizer.jobs.job import (
     commanded,
     extended,
 )
-from gaitswarm.services.optimizer.jobs.labels import Labels, LabelsChange
+from gaitswarm.services.optimizer.jobs.labels import (
+    Labels,
+    LabelsChange,
+    preference_name,
+    robot_name,
+)
+from gaitswarm.services.optimizer.jobs.listing import folded, storable
 from gaitswarm.services.optimizer.jobs.priority import check_can_be_prioritized
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
 from gaitswarm.services.optimizer.jobs.quota import Quota
@@ -52,7 +58,6 @@ from gaitswarm.services.optimizer.store.job_rows import (
     update_job,
 )
 from gaitswarm.services.optimizer.store.leases import has_live_lease, take_job
-from gaitswarm.services.optimizer.store.queries import folded
 from gaitswarm.services.optimizer.store.tables import (
     EXISTING,
     Row,
@@ -187,10 +192,11 @@ class Jobs(Aggregate):
                 job_row(connection, lineage.parent, lock=True)
             except NotFound as error:
                 raise Conflict(f"job {lineage.parent} that was to be forked was deleted") from error
+        document = spec.model_dump(mode="json")
         values = {
             "id": job_id,
             "state": JobState.QUEUED,
-            "spec": spec.model_dump(mode="json"),
+            "spec": document,
             "parent_id": None if lineage is None else lineage.parent,
             "lineage": None if lineage is None else lineage.model_dump(mode="json"),
             "created_at": now,
@@ -199,6 +205,11 @@ class Jobs(Aggregate):
             "iterations": 0,
             "evaluations": 0,
             "compute_seconds": 0.0,
+            "evaluations_taken": 0 if lineage is None else lineage.evaluations,
+            "kind": document["kind"],
+            "robot": robot_name(spec.robot),
+            "controller": getattr(spec, "controller", None),
+            "preference": preference_name(getattr(spec, "preference", None)),
             **_search_columns(job_id, spec.name, Labels()),
             **columns,
         }
@@ -262,7 +273,7 @@ class Jobs(Aggregate):
             changes, details = entering(state, now), {}
             if command is Command.RESUME:
                 accepts = state is JobState.QUEUED and accept_changes
-                changes |= {"error": None, "accepts_changes": accepts, "crashes": None}
+                changes |= {"error": None, "accepts_changes": accepts, "crashes": 0}
                 details = {"accept_changes": True} if accept_changes else {}
             note_change(connection, now, actor, AuditAction(command), job_id, **details)
             job = to_job(update_job(connection, row, changes))
@@ -352,9 +363,10 @@ class Jobs(Aggregate):
         Args:
             reference: published or start design, evaluated in the job's cases.
         """
-        unset = update(jobs).where(jobs.c.id == job_id, jobs.c.reference.is_(None))
+        unset = update(jobs).where(jobs.c.id == job_id, jobs.c.reference_kind.is_(None))
+        columns = {f"reference_{name}": value for name, value in asdict(reference).items()}
         with self._database.write("note_reference") as connection:
-            connection.execute(unset.values(reference=asdict(reference)))
+            connection.execute(unset.values(columns))
 
     def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
         """Protect a job from deletion, or release it.
@@ -413,7 +425,7 @@ class Jobs(Aggregate):
         expired = select(jobs.c.id).where(
             jobs.c.state.in_(ENDED.intersection(states)),
             jobs.c.finished_at < moment,
-            func.coalesce(jobs.c.kept, False).is_(False),
+            jobs.c.kept.is_(False),
             EXISTING,
             ~unfinished_fork,
         )
@@ -466,10 +478,12 @@ def _repeated_job(
 
 
 def _search_columns(job_id: str, spec_name: str, labels: Labels) -> dict[str, Any]:
-    """Return the columns by which a job is searched and sorted by name."""
+    """Return the columns by which a job is found and sorted by name."""
     name = labels.name or spec_name
     words = "\n".join((name, job_id, labels.note, *labels.tags))
-    return {"sort_name": folded(name) or None, "search_text": folded(words)}
+    tags = "\n".join(("", *labels.tags, ""))
+    columns = {"sort_name": folded(name) or None, "search_text": folded(words)}
+    return columns | {"tags": storable(tags) if labels.tags else None}
 
 
 def _mark_deleted(connection: Connection, ids: Collection[str], now: datetime, actor: str) -> None:

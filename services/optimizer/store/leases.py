@@ -21,6 +21,7 @@ from gaitswarm.services.optimizer.jobs.job import (
     Renewal,
     UnreadableSpec,
 )
+from gaitswarm.services.optimizer.jobs.listing import storable
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import (
@@ -38,7 +39,6 @@ from gaitswarm.services.optimizer.store.job_rows import (
     provenance_document,
     provenance_records,
     require_job,
-    storable,
     to_job,
     unreadable,
     update_job,
@@ -287,7 +287,7 @@ def _take_or_end(
         update_job(connection, row, entering(JobState.PAUSED, now))
         return None
     owner = row["lease_owner"]
-    crashes = (row["crashes"] or 0) + (owner is not None and owner != runner)
+    crashes = row["crashes"] + (owner is not None and owner != runner)
     if crashes >= quarantine_after:
         error = (
             f"quarantined: {crashes} runner processes in a row were killed or not heard of while"
@@ -334,7 +334,7 @@ def take_job(
         "lease_owner": runner,
         "lease_token": token,
         "lease_expires_at": now + timedelta(seconds=lease_seconds),
-        "crashes": crashes or None,
+        "crashes": crashes,
     }
     job = to_job(update_job(connection, row, changes))
     taken_from = None if owner == runner else owner
@@ -354,10 +354,10 @@ def _progress(job: Row, done: CompletedIteration) -> dict[str, Any]:
     """Return the columns of progress after one more iteration."""
     pace = done.evaluate_seconds / max(1, len(done.fitness))
     columns: dict[str, Any] = {
-        "crashes": None,
+        "crashes": 0,
         "iterations": done.iteration + 1,
         "evaluations": job["evaluations"] + len(done.fitness),
-        "evaluations_saved": (job["evaluations_saved"] or 0) + done.saved,
+        "evaluations_saved": job["evaluations_saved"] + done.saved,
         "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
         "recent_seconds": recent_pace(job["recent_seconds"], pace),
         "evaluated_on": done.evaluated_on,

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import fields
 from datetime import datetime
 
 from pydantic import ValidationError
-from sqlalchemy import Connection, Text, cast, func, insert, select, tuple_
+from sqlalchemy import Connection, func, insert, select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditAction
-from gaitswarm.services.optimizer.jobs.listing import Page, RecordingEntry, checked_limit
-from gaitswarm.services.optimizer.store.engine import Aggregate
-from gaitswarm.services.optimizer.store.job_rows import first_problems, unreadable
-from gaitswarm.services.optimizer.store.queries import (
+from gaitswarm.services.optimizer.jobs.listing import (
+    Page,
+    RecordingEntry,
+    checked_limit,
     folded,
     from_cursor,
-    length_at,
-    text_at,
     to_cursor,
 )
+from gaitswarm.services.optimizer.store.engine import Aggregate
+from gaitswarm.services.optimizer.store.job_rows import first_problems, unreadable
 from gaitswarm.services.optimizer.store.tables import recordings
 from gaitswarm.services.optimizer.store.tokens import note_change
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
@@ -41,14 +42,26 @@ class Recordings(Aggregate):
         Returns:
             Its id, a digest of its content.
         """
-        recording = hashlib.sha256(walk.model_dump_json().encode()).hexdigest()[:32]
+        text = walk.model_dump_json()
+        recording = hashlib.sha256(text.encode()).hexdigest()[:32]
         stored = select(recordings.c.id).where(recordings.c.id == recording)
         try:
             with self._database.write("add_recording") as connection:
                 if connection.execute(stored).first() is None:
                     now, document = self._clock(connection), walk.model_dump(mode="json")
-                    values = {"id": recording, "document": document, "created_at": now}
-                    connection.execute(insert(recordings).values(values))
+                    connection.execute(
+                        insert(recordings).values(
+                            id=recording,
+                            document=document,
+                            created_at=now,
+                            size=len(text),
+                            scenario=walk.scenario.name,
+                            controller=walk.controller,
+                            joints=len(walk.joints),
+                            rows=len(walk.current),
+                            synthetic=walk.synthetic,
+                        )
+                    )
                     action = AuditAction.ADD_RECORDING
                     note_change(connection, now, actor, action, recording=recording)
         except IntegrityError:
@@ -78,30 +91,17 @@ class Recordings(Aggregate):
             search: part of an id, scenario or controller, in any case.
         """
         limit = checked_limit(limit)
-        document, place = recordings.c.document, (recordings.c.created_at, recordings.c.id)
-        newest = [column.desc() for column in place]
-        page = select(recordings.c.id).order_by(*newest).limit(limit + 1)
+        table = recordings.c
+        columns = (table[field.name] for field in fields(RecordingEntry))
+        query = select(*columns).order_by(table.created_at.desc(), table.id.desc())
         if after is not None:
-            page = page.where(tuple_(*place) < from_cursor("recording", after, datetime))
+            place = from_cursor("recording", after, datetime)
+            query = query.where(tuple_(table.created_at, table.id) < place)
+        if search:
+            words = table.scenario + "\n" + table.controller + "\n" + table.id
+            query = query.where(func.lower(words).contains(folded(search), autoescape=True))
         with self._database.read("recording_list") as connection:
-            scenario = text_at(connection, document, "scenario", "name")
-            controller = text_at(connection, document, "controller")
-            if search:
-                words = scenario + "\n" + controller + "\n" + recordings.c.id
-                page = page.where(func.lower(words).contains(folded(search), autoescape=True))
-            # Documents outside the page are not parsed.
-            columns = (
-                func.length(cast(document, Text)).label("size"),
-                func.nullif(scenario, "").label("scenario"),
-                func.nullif(controller, "").label("controller"),
-                length_at(connection, document, "joints").label("joints"),
-                length_at(connection, document, "current").label("rows"),
-                # How each database spells a truth as text.
-                text_at(connection, document, "synthetic").in_(("true", "1")).label("synthetic"),
-            )
-            # Documents outside the page are not parsed.
-            query = select(*place, *columns).where(recordings.c.id.in_(page)).order_by(*newest)
-            rows = connection.execute(query).mappings().all()
+            rows = connection.execute(query.limit(limit + 1)).mappings().all()
         items = tuple(RecordingEntry(**row) for row in rows[:limit])
         if len(rows) <= limit:
             return Page(items, None)

@@ -111,17 +111,18 @@ jobs: Final = sa.Table(
     sa.Column("request_digest", sa.Text),
     # `ProvenanceRecords`.
     sa.Column("provenance", Document(none_as_null=True)),
-    # See `Job.accepts_changes`; NULL is false.
-    sa.Column("accepts_changes", sa.Boolean),
-    # Evaluations answered from the cache; NULL is none.
-    sa.Column("evaluations_saved", sa.BigInteger),
+    # See `Job.accepts_changes`.
+    sa.Column("accepts_changes", sa.Boolean, nullable=False, server_default=sa.false()),
+    # Evaluations answered from the cache, and those taken over by a fork.
+    sa.Column("evaluations_saved", sa.BigInteger, nullable=False, server_default="0"),
+    sa.Column("evaluations_taken", sa.BigInteger, nullable=False, server_default="0"),
     # Of a fork; no foreign key, as a fork outlives its parent.
     sa.Column("parent_id", sa.Text),
     sa.Column("lineage", Document(none_as_null=True)),
     # Name of the token it was submitted with; NULL for none.
     sa.Column("owner", sa.Text),
-    # Consecutive claims whose lease expired; NULL is none.
-    sa.Column("crashes", sa.Integer),
+    # Consecutive claims whose lease expired.
+    sa.Column("crashes", sa.Integer, nullable=False, server_default="0"),
     # Reason for waiting while running; NULL if it does not wait.
     sa.Column("waiting", sa.Text),
     # `Progress.recent_seconds`.
@@ -132,19 +133,24 @@ jobs: Final = sa.Table(
     sa.Column("notify_url", sa.Text),
     # Set from deletion until all rows are removed.
     sa.Column("deleted_at", UtcDateTime),
-    # Protected from deletion; NULL is false.
-    sa.Column("kept", sa.Boolean),
+    # Protected from deletion.
+    sa.Column("kept", sa.Boolean, nullable=False, server_default=sa.false()),
     # Simulated time of the whole budget [s]; NULL if unknown.
     sa.Column("simulated_seconds", sa.Double),
     # Higher priorities are claimed first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
     # `Labels`; NULL for none.
     sa.Column("labels", Document(none_as_null=True)),
-    # Hidden in lists; NULL is false.
-    sa.Column("archived", sa.Boolean),
-    # `Reference`; NULL until determined.
-    sa.Column("reference", Document(none_as_null=True)),
-    # Folded name and searched text, see `search_columns`; sorted by code points in both databases.
+    # Hidden in lists.
+    sa.Column("archived", sa.Boolean, nullable=False, server_default=sa.false()),
+    # `Reference`; NULL until determined, the kind until then only.
+    sa.Column("reference_name", sa.Text),
+    sa.Column("reference_fitness", sa.Double),
+    sa.Column("reference_kind", sa.Text),
+    # What lists filter by. Of the spec: kind and names, see `labels.py`; of the labels: tags, each
+    # between line ends.
+    *(sa.Column(n, sa.Text) for n in ("kind", "robot", "controller", "preference", "tags")),
+    # Folded name and searched text; sorted by code points in both databases.
     sa.Column("sort_name", sa.Text().with_variant(sa.Text(collation="C"), "postgresql")),
     sa.Column("search_text", sa.Text),
     # Where the last iteration was simulated; NULL if unknown.
@@ -162,8 +168,9 @@ jobs: Final = sa.Table(
     sa.Index(
         "ix_jobs_entries",
         *("id", "created_at", "best_fitness", "evaluations", "state", "iterations", "priority"),
-        *("compute_seconds", "reference", "lineage", "archived", "parent_id", "deleted_at"),
-        *("sort_name", "search_text"),
+        *("compute_seconds", "reference_fitness", "evaluations_taken", "archived", "parent_id"),
+        *("deleted_at", "sort_name", "search_text"),
+        *("kind", "robot", "controller", "preference", "tags"),
         sqlite_where=sa.text("deleted_at IS NULL"),
     ).ddl_if(dialect="sqlite"),
 )
@@ -253,6 +260,10 @@ recordings: Final = sa.Table(
     sa.Column("id", sa.Text, nullable=False),
     sa.Column("document", Document, nullable=False),
     sa.Column("created_at", UtcDateTime, nullable=False),
+    # What a list shows of it; see `RecordingEntry`.
+    *(sa.Column(n, sa.Text, nullable=False) for n in ("scenario", "controller")),
+    *(sa.Column(n, sa.Integer, nullable=False) for n in ("size", "joints", "rows")),
+    sa.Column("synthetic", sa.Boolean, nullable=False),
     sa.PrimaryKeyConstraint("id"),
 )
 

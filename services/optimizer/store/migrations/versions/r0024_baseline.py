@@ -1,8 +1,8 @@
-"""The first schema, created by `schema.create` of its version"""
+"""The first schema, created by `schema.create`"""
 
 from __future__ import annotations
 
-revision = "0020"
+revision = "0024"
 down_revision = None
 branch_labels = None
 depends_on = None

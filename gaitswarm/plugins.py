@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from gaitswarm.services.optimizer.search.method import Method, from_generator
-from gaitswarm.services.optimizer.search.optimizer import (
-    Optimizer,
-    SearchSettings,
-    checked_fitness,
-    checked_start,
-    matrix,
-    parse_state,
-)
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
 from gaitswarm.services.optimizer.search.pattern_search import Polls, PollSettings, polls
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.registry import create_search
+from gaitswarm.services.optimizer.search.registry import Method, create_search, from_generator
 from gaitswarm.services.optimizer.search.replayed import Proposals, Start
 from gaitswarm.services.optimizer.search.space import Axis, Judged, Space
 from gaitswarm.sim.case import Case, LongCase, Walk
@@ -77,14 +69,10 @@ __all__ = [
     "TableAxis",
     "Variable",
     "Walk",
-    "checked_fitness",
-    "checked_start",
     "create_search",
     "from_generator",
     "integral_gain",
     "load_robot",
-    "matrix",
-    "parse_state",
     "polls",
     "required",
     "simulate_walk",

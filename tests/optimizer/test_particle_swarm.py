@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.search.pso import (
     absorb,
     reflect,
 )
-from gaitswarm.services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.variables import Variable
@@ -60,7 +60,7 @@ def test_random_streams_do_not_depend_on_the_order_of_calls() -> None:
 
 def test_random_streams_do_not_overlap() -> None:
     streams = [
-        uniform(seed, purpose, iteration=iteration, particle=particle, count=1000)
+        RandomNumbers(seed, purpose, iteration=iteration, particle=particle).uniform(1000)
         for seed in (0, 1)
         for purpose in (1, 2)
         for iteration in (0, 1)
@@ -71,7 +71,7 @@ def test_random_streams_do_not_overlap() -> None:
 
 
 def draw(iteration: int, particle: int) -> tuple[float, ...]:
-    return tuple(uniform(7, 1, iteration=iteration, particle=particle, count=4).tolist())
+    return tuple(RandomNumbers(7, 1, iteration=iteration, particle=particle).uniform(4).tolist())
 
 
 def test_random_numbers_are_those_that_stored_jobs_were_made_with() -> None:
@@ -80,7 +80,7 @@ def test_random_numbers_are_those_that_stored_jobs_were_made_with() -> None:
 
 
 def test_random_numbers_fill_the_unit_interval_evenly() -> None:
-    numbers = uniform(2**63 - 1, 2, iteration=0, particle=0, count=20_000)
+    numbers = RandomNumbers(2**63 - 1, 2).uniform(20_000)
     assert numbers.min() >= 0.0 and numbers.max() < 1.0
     counts, _ = np.histogram(numbers, bins=20, range=(0.0, 1.0))
     assert np.abs(counts - 1000).max() < 150

@@ -21,7 +21,7 @@ from gaitswarm.services.optimizer.analysis.utilities import (
 )
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View
 
 Floats = NDArray[np.float64]
@@ -230,8 +230,7 @@ class _Undominated:
 def _estimated(points: Floats) -> tuple[Floats, float]:
     size = points.shape[1]
     samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
-    drawn = uniform(0, _DRAW, iteration=0, particle=0, count=samples * size)
-    left = drawn.reshape(samples, size)
+    left = RandomNumbers(0, _DRAW).uniform(samples, size)
     hits = np.zeros(len(points), dtype=np.int64)
     first, step = 0, 1
     while first < len(points) and len(left):

@@ -34,7 +34,7 @@ from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import Preference
-from gaitswarm.services.optimizer.search.random_stream import swarm_uniform, uniform
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, swarm_uniform
 from gaitswarm.services.optimizer.views import (
     DesignValues,
     Finite,
@@ -248,9 +248,8 @@ def _program(lead: Floats) -> tuple[Floats, float]:
 def _best_rank(lead: Floats, exponent: Floats) -> Floats:
     """The best-ranking of these exponents, each objective alone, and samples."""
     size = lead.shape[1]
-    numbers = uniform(0, _DRAW, iteration=0, particle=0, count=_DRAWN * size)
     # Uniform on the simplex.
-    drawn = -np.log1p(-numbers.reshape(_DRAWN, size))
+    drawn = -np.log1p(-RandomNumbers(0, _DRAW).uniform(_DRAWN, size))
     drawn /= drawn.sum(axis=1, keepdims=True)
     candidates = np.vstack([exponent, np.eye(size), drawn])
     step = max(1, _AT_ONCE // len(lead))

@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.analysis.statistics import (
     rank_correlation,
 )
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, uniform
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Particle, View
 
 Floats = NDArray[np.float64]
@@ -203,7 +203,7 @@ def _resampled(rows: int) -> NDArray[np.bool_]:
     drawn = np.zeros((1 + count, rows), dtype=np.bool_)
     drawn[0] = True
     for k in range(count):
-        numbers = uniform(0, _RESAMPLE, iteration=0, particle=k, count=rows)
+        numbers = RandomNumbers(0, _RESAMPLE, particle=k).uniform(rows)
         drawn[1 + k, (numbers * rows).astype(np.intp)] = True
     return drawn
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Any, Final, Union
 
 from pydantic import BaseModel, BeforeValidator, Discriminator, Tag, ValidationError
@@ -15,7 +16,6 @@ from gaitswarm.services.optimizer.search.automatic import (
     ChoiceName,
     ChosenSettings,
 )
-from gaitswarm.services.optimizer.search.method import settings_of
 from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.registry import DEFAULT_METHOD, METHODS
 from gaitswarm.sim.near_names import instead_of
@@ -105,7 +105,7 @@ else:
             custom_error_type="no_choice",
             custom_error_message="must be a name or an object with settings",
         ),
-        PluginSettings(METHODS, settings_of, "/v1/optimizers"),
+        PluginSettings(METHODS, attrgetter("settings"), "/v1/optimizers"),
     ]
 
 OptimizerChoice = Annotated[

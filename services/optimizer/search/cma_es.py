@@ -11,16 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, PositiveFloat
 
-from gaitswarm.services.optimizer.search.generational import (
-    Generational,
-    GenerationState,
-    Worth,
-    of_worth,
-)
-from gaitswarm.services.optimizer.search.generational import worth as as_json
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.stateful import (
+    Fitness,
+    Generational,
+    GenerationState,
+    Numbers,
+)
 from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
@@ -59,16 +58,54 @@ class CmaEsSettings(SearchSettings):
     )
 
 
-class _CmaEsState(GenerationState):
-    """The dumped state.
+class DistributionState(BaseModel):
+    """State of a `NormalDistribution`, in unit coordinates."""
 
-    Attributes:
-        restarts: Number of distributions before the current one.
-        bests: Least fitness of the latest generations.
-    """
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    mean: Numbers  # (d,)
+    sigma: PositiveFloat  # overall standard deviation
+    scale: Numbers  # (d,) factors of `sigma`
+    correlation: Numbers  # (d, d)
+    sigma_path: Numbers  # (d,) evolution paths
+    correlation_path: Numbers
+    scale_path: Numbers
+    weights: list[FiniteFloat]
+    """Share of the steady state that each of the three paths has reached."""
+    chances: list[Numbers]
+    """Probabilities of the choices, by categorical variable."""
+
+    @classmethod
+    def initial(cls, space: Space, mean: Floats, sigma: float) -> DistributionState:
+        d = space.dimension
+        choices = [round(span) + 1 for span in space.span[space.categorical].tolist()]
+        return cls(
+            mean=mean.copy(),
+            sigma=sigma,
+            scale=np.ones(d),
+            correlation=np.eye(d),
+            sigma_path=np.zeros(d),
+            correlation_path=np.zeros(d),
+            scale_path=np.zeros(d),
+            weights=[0.0, 0.0, 0.0],
+            chances=[np.full(k, 1.0 / k) for k in choices],
+        )
+
+    @property
+    def shapes(self) -> dict[str, Any]:
+        """Lengths of all lists."""
+        return {name: np.shape(value) for name, value in self if name != "chances"} | {
+            "chances": [len(chances) for chances in self.chances]
+        }
+
+
+class _CmaEsState(GenerationState):
+    """State of a search by distributions."""
 
     restarts: NonNegativeInt
-    bests: Worth
+    """Number of distributions before the current one."""
+    bests: Fitness
+    """Least fitness of the latest generations."""
     distribution: DistributionState
 
 
@@ -84,84 +121,80 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
     """
 
     state_model = _CmaEsState
+    _distribution: NormalDistribution | None = None
 
-    def __init__(self, settings: CmaEsSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search before its first ask."""
-        super().__init__(settings, space, budget, seed)
-        self._restarts = 0
-        self._bests: list[float] = []
-        self._distribution = self._about(np.full(space.dimension, 0.5))
+    def begin(self) -> None:
+        self.state.restarts = 0
+        self.state.bests = np.empty(0)
+        self._about(np.full(self.space.dimension, 0.5))
 
     @property
     def population(self) -> int:
         """Size of the generations until the next restart."""
         first = self.settings.population or 4 + math.floor(3.0 * math.log(self.space.dimension))
-        return min(_LARGEST_POPULATION, math.ceil(first * self.settings.growth**self._restarts))
+        grown = math.ceil(first * self.settings.growth**self.state.restarts)
+        return min(_LARGEST_POPULATION, grown)
 
     @property
     def first_size(self) -> int:
-        """Largest number of start positions that are learned from."""
         return self.population
+
+    @property
+    def distribution(self) -> NormalDistribution:
+        if self._distribution is None or self._distribution.state is not self.state.distribution:
+            self._distribution = NormalDistribution(
+                self.space, self.population, self.state.distribution
+            )
+        return self._distribution
 
     def propose(self) -> Floats:
         """Sample the distribution, after the start positions."""
-        if not self.generations and len(self._start):
+        if not self.state.generations and len(self._start):
             return np.empty((0, self.space.dimension))
-        return self._distribution.sample(self._random())
+        return self.distribution.sample(self._random())
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
         """Adapt to the order of the samples, or begin at the best start position."""
-        if not self.generations and len(self._start):
+        state, dimension = self.state, self.space.dimension
+        if not state.generations and len(self._start):
             best = positions[np.argmin(fitness)]
-            self._distribution = self._about(self.space.to_unit(best[np.newaxis])[0])
+            self._about(self.space.to_unit(best[np.newaxis])[0])
             return
-        self._distribution.learn(self._random(), np.argsort(fitness, kind="stable"))
-        patience = 10 + math.ceil(30 * self.space.dimension / self.population)
-        self._bests = [*self._bests, float(fitness.min())][-patience:]
-        if self._distribution.has_converged() or (
-            len(self._bests) == patience and self._stagnates()
-        ):
-            self._restarts += 1
-            random = RandomNumbers(self.seed, _RESTART, iteration=self._restarts)
-            self._distribution = self._about(random.uniform(self.space.dimension))
-            self._bests = []
+        self.distribution.learn(self._random(), np.argsort(fitness, kind="stable"))
+        patience = 10 + math.ceil(30 * dimension / self.population)
+        state.bests = np.append(state.bests, fitness.min())[-patience:]
+        stagnates = len(state.bests) == patience and _stagnates(state.bests.tolist())
+        if self.distribution.has_converged() or stagnates:
+            state.restarts += 1
+            random = RandomNumbers(self.seed, _RESTART, iteration=state.restarts)
+            self._about(random.uniform(dimension))
+            state.bests = np.empty(0)
 
-    def memory(self) -> dict[str, Any]:
-        """Return the distribution, restarts and recent bests."""
-        return {
-            "restarts": self._restarts,
-            "bests": as_json(self._bests),
-            "distribution": self._distribution.dump(),
-        }
+    def _check(self, state: _CmaEsState) -> None:
+        super()._check(state)
+        for name, shape in self.state.distribution.shapes.items():
+            if state.distribution.shapes[name] != shape:
+                raise ValueError(f"distribution.{name}: of another shape than in this job")
 
-    def recall(self, state: _CmaEsState) -> None:
-        """Restore the distribution, restarts and recent bests."""
-        before, self._restarts = self._restarts, state.restarts
-        try:
-            distribution = self._about(np.full(self.space.dimension, 0.5))
-            distribution.load(state.distribution)
-        except ValueError:
-            self._restarts = before
-            raise
-        self._distribution, self._bests = distribution, of_worth(state.bests).tolist()
-
-    def _about(self, mean: Floats) -> NormalDistribution:
-        """Create a distribution around a unit position."""
-        return NormalDistribution(self.space, self.population, mean, self.settings.sigma)
+    def _about(self, mean: Floats) -> None:
+        """Begin with a distribution around a unit position."""
+        initial = DistributionState.initial(self.space, mean, self.settings.sigma)
+        self.state.distribution = initial
 
     def _random(self) -> RandomNumbers:
         """Return the random numbers of this generation."""
-        return RandomNumbers(self.seed, _SAMPLE, iteration=self.generations)
+        return RandomNumbers(self.seed, _SAMPLE, iteration=self.state.generations)
 
-    def _stagnates(self) -> bool:
-        """Return whether the latest third of the recent generations is no better than the first.
 
-        Compares best and median, as in Hansen's tutorial (2016, B.3) but over fewer generations.
-        The thirds need not be equal, because a stepped surface makes them differ.
-        """
-        third = len(self._bests) // 3
-        before, after = self._bests[:third], self._bests[-third:]
-        return not any(_gains(of(before), of(after)) for of in (min, statistics.median_high))
+def _stagnates(bests: list[float]) -> bool:
+    """Return whether the latest third of the recent generations is no better than the first.
+
+    Compares best and median, as in Hansen's tutorial (2016, B.3) but over fewer generations. The
+    thirds need not be equal, because a stepped surface makes them differ.
+    """
+    third = len(bests) // 3
+    before, after = bests[:third], bests[-third:]
+    return not any(_gains(of(before), of(after)) for of in (min, statistics.median_high))
 
 
 def _gains(before: float, after: float) -> bool:
@@ -190,58 +223,20 @@ _NEARLY_DIAGONAL: Final = 2.0
 """Root of the condition up to which scales learn at full speed (beta_thresh)."""
 
 
-class DistributionState(BaseModel):
-    """The dumped state of `NormalDistribution`, in unit coordinates.
-
-    Attributes:
-        mean: (d,).
-        sigma: Overall standard deviation.
-        scale: (d,) factors of `sigma`.
-        correlation: (d, d).
-        sigma_path: (d,) evolution path of `sigma`.
-        correlation_path: (d,) that of the correlations.
-        scale_path: (d,) that of the scales.
-        weights: Share of the steady state that each of the three paths has reached.
-        chances: Probabilities of the choices, by categorical variable.
-    """
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    mean: list[FiniteFloat]
-    sigma: PositiveFloat
-    scale: list[PositiveFloat]
-    correlation: list[list[FiniteFloat]]
-    sigma_path: list[FiniteFloat]
-    correlation_path: list[FiniteFloat]
-    scale_path: list[FiniteFloat]
-    weights: list[FiniteFloat]
-    chances: list[list[PositiveFloat]]
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Rates:
-    """Learning rates of a part of the covariance.
+    """Learning rates of a part of the covariance."""
 
-    Attributes:
-        path: c_c of the evolution path.
-        rank_one: c_1.
-        rank_mu: c_mu.
-        weights: (n,) weights of the ordered samples, negative in the worse half (active CMA).
-    """
-
-    path: float
-    rank_one: float
-    rank_mu: float
+    path: float  # c_c of the evolution path
+    rank_one: float  # c_1
+    rank_mu: float  # c_mu
     weights: Floats
+    """(n,) weights of the ordered samples, negative in the worse half (active CMA)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Root:
-    """Root of a correlation matrix.
-
-    Attributes:
-        matrix: (d, d), symmetric; its square is the correlation matrix.
-    """
+    """Root of a correlation matrix: (d, d), symmetric; its square is the correlation matrix."""
 
     matrix: Floats
     inverse: Floats
@@ -257,20 +252,13 @@ class NormalDistribution:
     order and matrices are decomposed without a library, so that all processors give the same bits.
     """
 
-    def __init__(self, space: Space, size: int, mean: Floats, sigma: float) -> None:
-        """Create an initial distribution."""
+    def __init__(self, space: Space, size: int, state: DistributionState) -> None:
         d = space.dimension
         self._space: Final = space
         self._size: Final = size
-        self._mean, self._sigma = mean.copy(), sigma
-        self._scale, self._correlation = np.ones(d), np.eye(d)
+        self.state: Final = state
         self._decomposed: _Root | None = None
-        self._sigma_path, self._correlation_path, self._scale_path = np.zeros((3, d))
-        self._reached = [0.0, 0.0, 0.0]
         self._chosen: Final = np.flatnonzero(space.categorical).tolist()
-        self._chances = [
-            np.full(k, 1.0 / k) for k in (round(space.span[j]) + 1 for j in self._chosen)
-        ]
         raw = [math.log((size + 1) / 2.0) - math.log(i + 1.0) for i in range(size)]
         better = [max(w, 0.0) for w in raw]
         worse = [min(w, 0.0) for w in raw]
@@ -284,7 +272,7 @@ class NormalDistribution:
     def sample(self, random: RandomNumbers) -> Floats:
         """Sample a generation."""
         _, y = self._steps(random)
-        unit = self._mean + self._sigma * self._scale * y
+        unit = self.state.mean + self.state.sigma * self.state.scale * y
         designs = self._space.designs(self._space.from_unit(unit))
         if self._chosen:
             designs[:, self._chosen] = self._choices(random)
@@ -297,9 +285,9 @@ class NormalDistribution:
         choices = self._choices(random)[order] if self._chosen else None
         z, y = z[order], y[order]
         shift = product(self._better[np.newaxis], y)[0]
-        self._mean = self._mean + self._sigma * self._scale * shift
+        self.state.mean = self.state.mean + self.state.sigma * self.state.scale * shift
         h_sigma = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
-        path_step = h_sigma * self._scale * shift
+        path_step = h_sigma * self.state.scale * shift
         squares = np.ascontiguousarray(np.square(z).T).sum(axis=0)
         # Distant bad samples could remove more variance than there is, so each counts as d / |z|^2
         # (active CMA), at most four times.
@@ -309,12 +297,12 @@ class NormalDistribution:
         slowed = 1.0 / max(1.0, root.condition - _NEARLY_DIAGONAL + 1.0)
         factor = np.array([math.exp(c) for c in (0.5 * slowed * change).tolist()])
         spread = np.sqrt(np.maximum(np.diag(correlation), 1e-20))
-        self._scale = self._scale * factor * spread
-        self._correlation = correlation / (spread[:, np.newaxis] * spread)
+        self.state.scale = self.state.scale * factor * spread
+        self.state.correlation = correlation / (spread[:, np.newaxis] * spread)
         self._decomposed = None
-        self._scale = np.minimum(self._scale, _WIDEST / self._sigma)
-        reach = _REACH * self._sigma * self._scale
-        self._mean = np.clip(self._mean, -reach, 1.0 + reach)
+        self.state.scale = np.minimum(self.state.scale, _WIDEST / self.state.sigma)
+        reach = _REACH * self.state.sigma * self.state.scale
+        self.state.mean = np.clip(self.state.mean, -reach, 1.0 + reach)
         self._keep_trying_integers()
         if choices is not None:
             self._learn_choices(choices)
@@ -322,41 +310,8 @@ class NormalDistribution:
     def has_converged(self) -> bool:
         """Return whether all samples are equal or the covariance cannot be decomposed."""
         real = ~(self._space.integer | self._space.categorical)
-        widest = float(self._scale[real].max()) if real.any() else math.inf
-        return self._sigma * widest < _CONVERGED or self._root().condition > _WORST_CONDITION
-
-    def dump(self) -> dict[str, Any]:
-        """Return the complete state, JSON-compatible."""
-        return {
-            "mean": self._mean.tolist(),
-            "sigma": self._sigma,
-            "scale": self._scale.tolist(),
-            "correlation": self._correlation.tolist(),
-            "sigma_path": self._sigma_path.tolist(),
-            "correlation_path": self._correlation_path.tolist(),
-            "scale_path": self._scale_path.tolist(),
-            "weights": list(self._reached),
-            "chances": [chances.tolist() for chances in self._chances],
-        }
-
-    def load(self, state: DistributionState) -> None:
-        """Restore a state of the same space and size."""
-        d = self._space.dimension
-        rows = {
-            name: matrix([getattr(state, name)], (1, d), f"distribution.{name}")[0]
-            for name in ("mean", "scale", "sigma_path", "correlation_path", "scale_path")
-        }
-        correlation = matrix(state.correlation, (d, d), "distribution.correlation")
-        if len(state.weights) != len(self._reached):
-            raise ValueError(f"distribution.weights: expected {len(self._reached)} of them")
-        if [len(row) for row in state.chances] != [len(row) for row in self._chances]:
-            raise ValueError("distribution.chances: do not match the choices of this job")
-        self._mean, self._sigma, self._scale = rows["mean"], state.sigma, rows["scale"]
-        self._correlation, self._decomposed = correlation, None
-        self._reached = list(state.weights)
-        self._sigma_path, self._scale_path = rows["sigma_path"], rows["scale_path"]
-        self._correlation_path = rows["correlation_path"]
-        self._chances = [np.array(row) for row in state.chances]
+        widest = float(self.state.scale[real].max()) if real.any() else math.inf
+        return self.state.sigma * widest < _CONVERGED or self._root().condition > _WORST_CONDITION
 
     def _rates(self, parameters: float) -> _Rates:
         """Return the rates of a part with a number of parameters (table 1)."""
@@ -372,7 +327,7 @@ class NormalDistribution:
     def _root(self) -> _Root:
         """Return the root of the correlations, cached until they change."""
         if self._decomposed is None:
-            values, vectors = eigen(self._correlation)
+            values, vectors = eigen(self.state.correlation)
             roots = np.sqrt(np.maximum(values, 1e-20))
             self._decomposed = _Root(
                 product(vectors * roots, vectors.T),
@@ -391,7 +346,7 @@ class NormalDistribution:
         lots = random.uniform(self._size, len(self._chosen))
         columns = [
             np.minimum(np.searchsorted(np.cumsum(chances), lot, side="right"), len(chances) - 1)
-            for chances, lot in zip(self._chances, lots.T, strict=True)
+            for chances, lot in zip(self.state.chances, lots.T, strict=True)
         ]
         return np.array(columns, dtype=np.float64).T
 
@@ -400,41 +355,43 @@ class NormalDistribution:
         d, mu_eff = self._space.dimension, self._mu_eff
         rate = (mu_eff + 2.0) / (d + mu_eff + 5.0)
         damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (d + 1.0)) - 1.0)
-        self._sigma_path = (1.0 - rate) * self._sigma_path + math.sqrt(
+        self.state.sigma_path = (1.0 - rate) * self.state.sigma_path + math.sqrt(
             rate * (2.0 - rate) * mu_eff
         ) * step
-        self._reached[0] = (1.0 - rate) ** 2 * self._reached[0] + rate * (2.0 - rate)
-        length = math.fsum(self._sigma_path**2)
+        self.state.weights[0] = (1.0 - rate) ** 2 * self.state.weights[0] + rate * (2.0 - rate)
+        length = math.fsum(self.state.sigma_path**2)
         expected = math.sqrt(d) * (1.0 - 1.0 / (4.0 * d) + 1.0 / (21.0 * d * d))
-        excess = math.sqrt(length) / expected - math.sqrt(self._reached[0])
-        self._sigma = min(_WIDEST, self._sigma * math.exp(rate / damping * excess))
-        return 1.0 if length / self._reached[0] < (2.0 + 4.0 / (d + 1.0)) * d else 0.0
+        excess = math.sqrt(length) / expected - math.sqrt(self.state.weights[0])
+        self.state.sigma = min(_WIDEST, self.state.sigma * math.exp(rate / damping * excess))
+        return 1.0 if length / self.state.weights[0] < (2.0 + 4.0 / (d + 1.0)) * d else 0.0
 
     def _learned_correlation(self, path_step: Floats, y: Floats, weight_factor: Floats) -> Floats:
         """Return the updated covariance of y, whose diagonal is no longer 1."""
         rates = self._correlation_rates
-        self._correlation_path, self._reached[1] = self._path(
-            rates, self._correlation_path, path_step, self._reached[1]
+        self.state.correlation_path, self.state.weights[1] = self._path(
+            rates, self.state.correlation_path, path_step, self.state.weights[1]
         )
-        path = self._correlation_path / self._scale
+        path = self.state.correlation_path / self.state.scale
         weights = np.where(rates.weights < 0.0, rates.weights * weight_factor, rates.weights)
-        rank_one = path[:, np.newaxis] * path - self._reached[1] * self._correlation
+        rank_one = path[:, np.newaxis] * path - self.state.weights[1] * self.state.correlation
         rank_mu = (
-            product((y * weights[:, np.newaxis]).T, y) - math.fsum(weights) * self._correlation
+            product((y * weights[:, np.newaxis]).T, y) - math.fsum(weights) * self.state.correlation
         )
-        return self._correlation + rates.rank_one * rank_one + rates.rank_mu * rank_mu
+        return self.state.correlation + rates.rank_one * rank_one + rates.rank_mu * rank_mu
 
     def _learned_scale(self, path_step: Floats, z: Floats, weight_factor: Floats) -> Floats:
         """Return (d,) changes of the logarithms of the variances."""
         rates = self._scale_rates
-        self._scale_path, self._reached[2] = self._path(
-            rates, self._scale_path, path_step, self._reached[2]
+        self.state.scale_path, self.state.weights[2] = self._path(
+            rates, self.state.scale_path, path_step, self.state.weights[2]
         )
-        path = product((self._scale_path / self._scale)[np.newaxis], self._root().inverse)[0]
+        path = product(
+            (self.state.scale_path / self.state.scale)[np.newaxis], self._root().inverse
+        )[0]
         weights = np.where(rates.weights < 0.0, rates.weights * weight_factor, rates.weights)
         rank_mu = product(weights[np.newaxis], np.square(z))[0] - math.fsum(weights)
         change: Floats = (
-            rates.rank_one * (np.square(path) - self._reached[2]) + rates.rank_mu * rank_mu
+            rates.rank_one * (np.square(path) - self.state.weights[2]) + rates.rank_mu * rank_mu
         )
         return change
 
@@ -455,16 +412,16 @@ class NormalDistribution:
         away = float(-ndtri(_OTHERS / self._size))
         for j in np.flatnonzero(self._space.integer).tolist():
             last = float(self._space.span[j])
-            value = min(max(round(float(self._mean[j]) * last), 0), round(last))
+            value = min(max(round(float(self.state.mean[j]) * last), 0), round(last))
             edges = [value - 0.5] * (value > 0) + [value + 0.5] * (value < last)
-            nearest = min(abs(float(self._mean[j]) * last - edge) for edge in edges) / last
-            least = nearest / away / self._sigma
-            self._scale[j] = max(self._scale[j], least)
+            nearest = min(abs(float(self.state.mean[j]) * last - edge) for edge in edges) / last
+            least = nearest / away / self.state.sigma
+            self.state.scale[j] = max(self.state.scale[j], least)
 
     def _learn_choices(self, choices: Floats) -> None:
         """Move probabilities towards the choices of better samples, above the minimum."""
         rate = min(1.0, self._scale_rates.rank_one + self._scale_rates.rank_mu)
-        for column, chances in zip(choices.T, self._chances, strict=True):
+        for column, chances in zip(choices.T, self.state.chances, strict=True):
             taken = [math.fsum(self._better[column == choice]) for choice in range(len(chances))]
             least = min(_OTHERS / self._size, 0.5) / (len(chances) - 1)
             moved = np.maximum(chances + rate * (np.array(taken) - chances), least)

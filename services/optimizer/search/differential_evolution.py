@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, FiniteFloat, NonNegativeInt, model_validator
+from pydantic import Field, NonNegativeInt, model_validator
 
-from gaitswarm.services.optimizer.search.generational import (
-    Generational,
-    GenerationState,
-    Row,
-    Worth,
-    of_worth,
-    worth,
-)
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.stateful import (
+    Fitness,
+    Generational,
+    GenerationState,
+    Numbers,
+    Points,
+)
 
 Floats = NDArray[np.float64]
 
@@ -86,23 +85,18 @@ class DeSettings(SearchSettings):
 
 
 class _PopulationState(GenerationState):
-    """The dumped state.
-
-    Attributes:
-        began: Evaluations before this population.
-        members: Positions of the population, empty before its first generation is evaluated.
-        member_fitness: Fitness of the members; None where none has succeeded yet.
-        archive: Positions that were replaced.
-        successes: Number of successful generations.
-    """
+    """State of a population, which is empty before its first generation is evaluated."""
 
     began: NonNegativeInt
-    members: list[Row]
-    member_fitness: Worth
-    archive: list[Row]
-    scales: list[FiniteFloat]
-    crossovers: list[FiniteFloat]
+    """Evaluations before this population."""
+    members: Points
+    member_fitness: Fitness
+    archive: Points
+    """Positions that were replaced."""
+    scales: Numbers
+    crossovers: Numbers
     successes: NonNegativeInt
+    """Number of successful generations."""
 
 
 class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
@@ -117,70 +111,52 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
     state_model = _PopulationState
 
-    _members: Floats
-    _fitness_of_members: Floats
-    _archive: Floats
-    _scales: Floats
-    _crossovers: Floats
-
-    def __init__(self, settings: DeSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search before its first ask."""
-        super().__init__(settings, space, budget, seed)
-        self._begin()
-
     @property
     def first_size(self) -> int:
-        """Size of a new population."""
         return self.settings.population
 
     @property
     def population(self) -> Floats:
         """(n, d) positions of the members, (0, d) before their first generation is evaluated."""
-        return self._members.copy()
+        return self.state.members.copy()
+
+    def begin(self) -> None:
+        settings, state, d = self.settings, self.state, self.space.dimension
+        state.began = state.evaluations
+        state.members, state.member_fitness = np.empty((0, d)), np.empty(0)
+        state.archive = np.empty((0, d))
+        state.scales = np.full(settings.memory, settings.scale)
+        state.crossovers = np.full(settings.memory, settings.crossover)
+        state.successes = 0
 
     def propose(self) -> Floats:
-        """Sample a population, or create a trial of each member."""
-        random = self._random()
-        if not len(self._members):
+        random, members = self._random(), self.state.members
+        if not len(members):
             return latin_hypercube(self.space, self.settings.population, random)
         scale, crossover = self._parameters(random)
-        trials = crossed(self._members, self._mutants(random, scale), crossover, random)
-        return without_duplicates(self.space, self._members, trials, random)
+        trials = crossed(members, self._mutants(random, scale), crossover, random)
+        return without_duplicates(self.space, members, trials, random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Replace each member by its trial, if that is no worse."""
-        if len(self._members):
+        state = self.state
+        if len(state.members):
             self._select(positions, fitness)
         else:
-            self._members, self._fitness_of_members = positions.copy(), fitness.copy()
+            state.members, state.member_fitness = positions.copy(), fitness.copy()
         self._shrink()
-        if (np.ptp(self.space.to_unit(self._members), axis=0) < _CONVERGED).all():
-            self._begin()
+        if has_converged(self.space, state.members):
+            self.begin()
 
-    def memory(self) -> dict[str, Any]:
-        """Return the population, its archive and its memory."""
-        return {
-            "began": self._began,
-            "members": self._members.tolist(),
-            "member_fitness": worth(self._fitness_of_members),
-            "archive": self._archive.tolist(),
-            "scales": self._scales.tolist(),
-            "crossovers": self._crossovers.tolist(),
-            "successes": self._successes,
-        }
-
-    def recall(self, state: _PopulationState) -> None:
-        """Restore the population, its archive and its memory."""
-        settings, d = self.settings, self.space.dimension
-        size = len(state.members)
+    def _check(self, state: _PopulationState) -> None:
+        super()._check(state)
+        settings, size = self.settings, len(state.members)
         least = settings.population_end if size else 0
         if not least <= size <= settings.population:
             raise ValueError(f"members: {size} of them, not {least} to {settings.population}")
-        if len(state.member_fitness) != size:
-            raise ValueError(f"member_fitness: {len(state.member_fitness)} values, not {size}")
-        for name in ("scales", "crossovers"):
-            if len(getattr(state, name)) != settings.memory:
-                raise ValueError(f"{name}: expected {settings.memory} of them")
+        lengths = {"member_fitness": size, "scales": settings.memory, "crossovers": settings.memory}
+        for name, length in lengths.items():
+            if getattr(state, name).shape != (length,):
+                raise ValueError(f"{name}: expected {length} of them")
         judged, asked = len(state.fitness), len(state.positions)
         # The first generation may be of more start positions than there are members.
         whole = {size or settings.population} | (
@@ -188,32 +164,16 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         )
         if judged < asked and asked not in whole:
             raise ValueError(f"positions: {asked} of them under way for {size} members")
-        members = self.inside(matrix(state.members, (size, d), "members"), "members")
-        shape = (len(state.archive), d)
-        self._archive = self.inside(matrix(state.archive, shape, "archive"), "archive")
-        self._members, self._fitness_of_members = members, of_worth(state.member_fitness)
-        self._scales, self._crossovers = np.array(state.scales), np.array(state.crossovers)
-        self._began, self._successes = state.began, state.successes
-
-    def _begin(self) -> None:
-        """Reset to the start."""
-        settings, d = self.settings, self.space.dimension
-        self._began = self.evaluations
-        self._members, self._fitness_of_members = np.empty((0, d)), np.empty(0)
-        self._archive = np.empty((0, d))
-        self._scales = np.full(settings.memory, settings.scale)
-        self._crossovers = np.full(settings.memory, settings.crossover)
-        self._successes = 0
 
     def _random(self) -> RandomNumbers:
         """Return the random numbers of this generation."""
-        return RandomNumbers(self.seed, _EVOLVE, iteration=self.generations)
+        return RandomNumbers(self.seed, _EVOLVE, iteration=self.state.generations)
 
     def _parameters(self, random: RandomNumbers) -> tuple[Floats, Floats]:
         """Draw (n,) scales and (n,) crossovers; the first numbers of a generation."""
-        n = len(self._members)
+        n = len(self.state.members)
         chosen = indices(random.uniform(n), self.settings.memory)
-        scales, crossovers = self._scales[chosen], self._crossovers[chosen]
+        scales, crossovers = self.state.scales[chosen], self.state.crossovers[chosen]
         if self.settings.adaptation == "none":
             return scales, crossovers
         crossover = np.clip(crossovers + _SPREAD * random.normal(n), 0.0, 1.0)
@@ -225,13 +185,13 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
     def _mutants(self, random: RandomNumbers, scale: Floats) -> Floats:
         """Move members towards one of the best and by a difference of two others."""
-        space, members = self.space, self._members
+        space, members = self.space, self.state.members
         n, me = len(members), np.arange(len(members))
-        order = np.argsort(self._fitness_of_members, kind="stable")
+        order = np.argsort(self.state.member_fitness, kind="stable")
         best_count = min(n, max(2, round(self.settings.best_share * n)))
         best = members[order[indices(random.uniform(n), best_count)]]
         one = (me + 1 + indices(random.uniform(n), n - 1)) % n
-        pool = np.concatenate([members, self._archive])
+        pool = np.concatenate([members, self.state.archive])
         other = indices(random.uniform(n), len(pool) - 2)
         # Excludes the member itself and the first of the two.
         other += other >= np.minimum(me, one)
@@ -245,38 +205,36 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
     def _select(self, trials: Floats, fitness: Floats) -> None:
         """Replace members by trials that are no worse."""
-        before, better = self._fitness_of_members, fitness < self._fitness_of_members
+        state = self.state
+        before, better = state.member_fitness, fitness < state.member_fitness
         if better.any():
-            self._archive = np.concatenate([self._archive, self._members[better]])
+            state.archive = np.concatenate([state.archive, state.members[better]])
             self._remember(better, gains(before, fitness))
         taken = fitness <= before
-        self._members = np.where(taken[:, np.newaxis], trials, self._members)
-        self._fitness_of_members = np.where(taken, fitness, before)
+        state.members = np.where(taken[:, np.newaxis], trials, state.members)
+        state.member_fitness = np.where(taken, fitness, before)
 
     def _remember(self, better: NDArray[np.bool_], gain: Floats) -> None:
         """Replace the oldest memory by successful values, weighted by their gains."""
         if self.settings.adaptation == "none":
             return
+        state = self.state
         scale, crossover = self._parameters(self._random())
-        place = self._successes % self.settings.memory
-        self._scales[place] = lehmer_mean(scale[better], gain[better])
-        self._crossovers[place] = lehmer_mean(crossover[better], gain[better])
-        self._successes += 1
+        place = state.successes % self.settings.memory
+        state.scales[place] = lehmer_mean(scale[better], gain[better])
+        state.crossovers[place] = lehmer_mean(crossover[better], gain[better])
+        state.successes += 1
 
     def _shrink(self) -> None:
         """Remove the worst members, and the oldest of the archive."""
-        settings = self.settings
-        done = (self.evaluations - self._began) / max(1, self.budget - self._began)
+        settings, state = self.settings, self.state
+        done = (state.evaluations - state.began) / max(1, self.budget - state.began)
         fall = settings.population - settings.population_end
         planned = settings.population - round(fall * min(1.0, done))
-        order = np.argsort(self._fitness_of_members, kind="stable")
-        kept = np.sort(order[:planned])
-        self._members, self._fitness_of_members = (
-            self._members[kept],
-            self._fitness_of_members[kept],
-        )
+        kept = np.sort(np.argsort(state.member_fitness, kind="stable")[:planned])
+        state.members, state.member_fitness = state.members[kept], state.member_fitness[kept]
         room = round(settings.archive * len(kept))
-        self._archive = self._archive[max(0, len(self._archive) - room) :]
+        state.archive = state.archive[max(0, len(state.archive) - room) :]
 
 
 def gains(before: Floats, after: Floats) -> Floats:
@@ -295,6 +253,10 @@ def lehmer_mean(values: Floats, weights: Floats) -> float:
 
 _ANY_CHOICE: Final = 0.1
 """Probability that a changed categorical variable takes a random choice."""
+
+
+def has_converged(space: Space, members: Floats) -> bool:
+    return bool((np.ptp(space.to_unit(members), axis=0) < _CONVERGED).all())
 
 
 def latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:

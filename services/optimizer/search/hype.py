@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,22 +10,20 @@ from pydantic import Field, model_validator
 
 from gaitswarm.services.optimizer.search.differential_evolution import (
     crossed,
+    has_converged,
     indices,
     latin_hypercube,
     with_choices,
     without_duplicates,
 )
-from gaitswarm.services.optimizer.search.generational import (
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_fitness
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.stateful import (
+    Fitness,
     Generational,
     GenerationState,
-    Row,
-    Worth,
-    of_worth,
-    worth,
+    Points,
 )
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_fitness, matrix
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -33,9 +31,6 @@ Indices = NDArray[np.intp]
 _VARY: Final = 7
 _SAMPLE: Final = 8
 """Purposes of random streams: never renumbered, or stored jobs would change their future."""
-
-_CONVERGED: Final = 1e-9
-"""Extent of a population, as a share of each variable's range, below which it restarts."""
 
 
 class HypeSettings(SearchSettings):
@@ -68,16 +63,11 @@ class HypeSettings(SearchSettings):
 
 
 class _PopulationState(GenerationState):
-    """The dumped state; `fitness` has the objective vectors of the generation under way.
+    """State of a population, which is empty before its first generation is evaluated."""
 
-    Attributes:
-        members: Positions of the population, empty before its first generation is evaluated.
-        vectors: Objective vectors of the members.
-    """
-
-    fitness: list[Worth]  # type: ignore[assignment]
-    members: list[Row]
-    vectors: list[Worth]
+    members: Points
+    vectors: Fitness
+    """Objective vectors of the members."""
 
 
 class Hype(Generational[HypeSettings, _PopulationState]):
@@ -94,58 +84,40 @@ class Hype(Generational[HypeSettings, _PopulationState]):
 
     state_model = _PopulationState
 
-    _members: Floats
-    _vectors: Floats
-
-    def __init__(self, settings: HypeSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search before its first ask."""
-        super().__init__(settings, space, budget, seed)
-        self._begin()
-
     @property
     def first_size(self) -> int:
-        """Size of a new population."""
         return self.settings.population
 
     @property
     def population(self) -> tuple[Floats, Floats]:
         """(n, d) positions and (n, M) objective vectors of the members; empty at first."""
-        return self._members.copy(), self._vectors.copy()
+        return self.state.members.copy(), self.state.vectors.copy()
 
-    @property
-    def objectives(self) -> int | None:
-        """Number of objectives, M; None before the first feedback."""
-        vectors = self._vectors if len(self._vectors) else self._fitness
-        return vectors.shape[1] if len(vectors) else None
+    def begin(self) -> None:
+        state = self.state
+        state.members, state.vectors = np.empty((0, self.space.dimension)), np.empty((0, 0))
 
-    def checked(self, fitness: Floats, asked: int) -> Floats:
-        """Check objective vectors."""
-        first = fitness.shape[1] if fitness.ndim > 1 else 0
-        return checked_fitness(fitness, asked, self.objectives or max(1, first))
-
-    def written(self, fitness: Floats) -> list[Any]:
-        """Convert objective vectors to JSON."""
-        return [worth(row) for row in fitness.tolist()]
-
-    def read(self, values: list[Any]) -> Floats:
-        """Convert objective vectors from JSON."""
-        return vectors_of(values, "fitness")
+    def _checked(self, fitness: Floats) -> Floats:
+        known = self.state.vectors if len(self.state.vectors) else self.state.fitness
+        first = known if len(known) else fitness
+        objectives = first.shape[1] if first.ndim > 1 else 1
+        return checked_fitness(fitness, self.state.asked, max(1, objectives))
 
     def propose(self) -> Floats:
-        """Sample a population, or create trials."""
-        random = RandomNumbers(self.seed, _VARY, iteration=self.generations)
-        if not len(self._members):
+        random = RandomNumbers(self.seed, _VARY, iteration=self.state.generations)
+        if not len(self.state.members):
             return latin_hypercube(self.space, self.settings.population, random)
         return self._trials(random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
         """Select the next population from members and trials."""
-        pool = np.concatenate([self._members, positions])
-        vectors = np.concatenate([self._vectors, fitness]) if len(self._vectors) else fitness
+        state = self.state
+        pool = np.concatenate([state.members, positions])
+        vectors = np.concatenate([state.vectors, fitness]) if len(state.vectors) else fitness
         kept = self.best(vectors, min(len(pool), self.settings.population))
-        self._members, self._vectors = pool[kept], vectors[kept]
-        if (np.ptp(self.space.to_unit(self._members), axis=0) < _CONVERGED).all():
-            self._begin()
+        state.members, state.vectors = pool[kept], vectors[kept]
+        if has_converged(self.space, state.members):
+            self.begin()
 
     def best(self, fitness: Floats, count: int) -> Indices:
         """Choose complete fronts, and of the next one the largest hypervolume."""
@@ -159,36 +131,26 @@ class Hype(Generational[HypeSettings, _PopulationState]):
             kept = np.concatenate([kept, front[:room]])
         return np.sort(kept)
 
-    def memory(self) -> dict[str, Any]:
-        """Return the population."""
-        return {"members": self._members.tolist(), "vectors": self.written(self._vectors)}
-
-    def recall(self, state: _PopulationState) -> None:
-        """Restore a population."""
+    def _check(self, state: _PopulationState) -> None:
+        super()._check(state)
         size, most = len(state.members), self.settings.population
         if size > most:
             raise ValueError(f"members: {size} of them, more than {most}")
         if len(state.vectors) != size:
             raise ValueError(f"vectors: {len(state.vectors)} of them, not {size}")
-        vectors = vectors_of(state.vectors, "vectors")
-        current = vectors_of(state.fitness, "fitness")
-        if len(current) and size and current.shape[1] != vectors.shape[1]:
-            raise ValueError(f"fitness: vectors of {current.shape[1]}, not {vectors.shape[1]}")
-        shape = (size, self.space.dimension)
-        self._members = self.inside(matrix(state.members, shape, "members"), "members")
-        self._vectors = vectors
-
-    def _begin(self) -> None:
-        """Reset to the start."""
-        self._members, self._vectors = np.empty((0, self.space.dimension)), np.empty((0, 0))
+        for name, vectors in (("vectors", state.vectors), ("fitness", state.fitness)):
+            if len(vectors) and (vectors.ndim != 2 or not vectors.size):
+                raise ValueError(f"{name}: vectors were expected")
+        if size and len(state.fitness) and state.fitness.shape[1] != state.vectors.shape[1]:
+            raise ValueError(f"fitness: expected vectors of {state.vectors.shape[1]} numbers")
 
     def _hypervolume(self, front: Floats) -> SampledHypervolume:
-        random = RandomNumbers(self.seed, _SAMPLE, iteration=self.generations)
+        random = RandomNumbers(self.seed, _SAMPLE, iteration=self.state.generations)
         return SampledHypervolume(front, self.settings.samples, random)
 
     def _trials(self, random: RandomNumbers) -> Floats:
         """Move winners of tournaments towards others and by differences of any two members."""
-        settings, space, members = self.settings, self.space, self._members
+        settings, space, members = self.settings, self.space, self.state.members
         n, m = settings.offspring, len(members)
         places = self._places()
         own, towards = (self._winners(places, random) for _ in range(2))
@@ -205,12 +167,12 @@ class Hype(Generational[HypeSettings, _PopulationState]):
 
     def _places(self) -> Indices:
         """Return (m,) places of the members, 0 the best: by front, then by share of it."""
-        ranks = pareto_ranks(self._vectors)
+        ranks = pareto_ranks(self.state.vectors)
         shares = np.zeros(len(ranks), dtype=np.int64)
         for rank in range(int(ranks.max()) + 1):
             front = ranks == rank
-            if np.isfinite(self._vectors[front]).all():
-                shares[front] = self._hypervolume(self._vectors[front]).shares()
+            if np.isfinite(self.state.vectors[front]).all():
+                shares[front] = self._hypervolume(self.state.vectors[front]).shares()
         return np.argsort(np.lexsort((-shares, ranks)))
 
     def _winners(self, places: Indices, random: RandomNumbers) -> Indices:
@@ -295,10 +257,3 @@ def _weights(size: int, going: int) -> NDArray[np.int64]:
         weights[others + 1] = chance / (others + 1)
         chance *= (going - others - 1) / max(1, size - others - 1)
     return np.asarray(np.rint(weights * _UNIT), dtype=np.int64)
-
-
-def vectors_of(rows: list[Worth], name: str) -> Floats:
-    """Convert objective vectors of a dumped state."""
-    if len({len(row) for row in rows}) > 1 or any(not row for row in rows):
-        raise ValueError(f"{name}: vectors of one length were expected")
-    return np.array([of_worth(row) for row in rows], dtype=np.float64)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.search.space import Space
-from gaitswarm.sim.input import message_of
+
+Floats = NDArray[np.float64]
 
 
 class SearchSettings(BaseModel):
@@ -50,7 +51,7 @@ class Optimizer(Protocol):
     def evaluations(self) -> int:
         """Number of positions evaluated so far."""
 
-    def start_from(self, positions: NDArray[np.float64]) -> None:
+    def start_from(self, positions: Floats) -> None:
         """Begin with known good positions: they are the first that are asked for.
 
         Args:
@@ -61,7 +62,7 @@ class Optimizer(Protocol):
                 already been asked for.
         """
 
-    def ask(self, most: int | None = None) -> NDArray[np.float64]:
+    def ask(self, most: int | None = None) -> Floats:
         """Return the positions to evaluate next; the same ones until their fitness is known.
 
         Args:
@@ -72,7 +73,7 @@ class Optimizer(Protocol):
             (n, d), inside the bounds, in the variables' own units.
         """
 
-    def tell(self, fitness: NDArray[np.float64]) -> None:
+    def tell(self, fitness: Floats) -> None:
         """Receive the fitness of the positions that were asked for last.
 
         Args:
@@ -110,35 +111,18 @@ class Rejudging(Optimizer, Protocol):
     It keeps its current positions and continues by the other fitness.
     """
 
-    def rejudge(
-        self, generations: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
-    ) -> None:
+    def rejudge(self, generations: Sequence[tuple[Floats, Floats]]) -> None:
         """Replace the fitness of all positions evaluated so far.
 
-        Args:
-            generations: (n, d) positions and (n,) fitness, +inf for a failed evaluation, of
-                all evaluations, in order.
-
-        Raises:
-            ValueError: These are not all evaluations, or a generation is incomplete.
+        generations: (n, d) positions and (n,) fitness, +inf for a failed evaluation, of all
+        evaluations, in order. Raises ValueError if some are missing or a generation is incomplete.
         """
 
 
-def checked_fitness(
-    fitness: NDArray[np.float64], asked: int, objectives: int | None = None
-) -> NDArray[np.float64]:
-    """Check the argument of `Optimizer.tell`.
+def checked_fitness(fitness: Floats, asked: int, objectives: int | None = None) -> Floats:
+    """Return a copy of the argument of `Optimizer.tell`; raises ValueError.
 
-    Args:
-        fitness: Of the positions asked for last.
-        asked: Number of these positions, 0 if there are none.
-        objectives: Length of an objective vector; None for a single fitness.
-
-    Returns:
-        (asked,) or (asked, objectives); a copy.
-
-    Raises:
-        ValueError: Nothing was asked for, the shape differs, or a value is NaN or -inf.
+    asked: number of positions asked for last; objectives: length of an objective vector.
     """
     if not asked:
         raise ValueError("tell() before ask(): no positions are waiting for a fitness")
@@ -152,23 +136,8 @@ def checked_fitness(
     return np.array(fitness, dtype=np.float64)
 
 
-def checked_start(
-    positions: NDArray[np.float64], space: Space, *, begun: bool
-) -> NDArray[np.float64]:
-    """Check the argument of `Optimizer.start_from`.
-
-    Args:
-        positions: Positions to begin with.
-        space: The box that is searched.
-        begun: Whether positions have already been asked for.
-
-    Returns:
-        (k, d), a copy.
-
-    Raises:
-        ValueError: A position is outside the bounds or has another dimension, or the search has
-            begun.
-    """
+def checked_start(positions: Floats, space: Space, *, begun: bool) -> Floats:
+    """Return a copy of the argument of `Optimizer.start_from`; raises ValueError."""
     if begun:
         raise ValueError("start_from() after ask(): the search has already begun")
     if positions.ndim != 2 or positions.shape[1] != space.dimension:
@@ -176,47 +145,3 @@ def checked_start(
     if not ((positions >= space.low) & (positions <= space.high)).all():
         raise ValueError("start: outside the bounds of this job")
     return np.array(positions, dtype=np.float64)
-
-
-M = TypeVar("M", bound=BaseModel)
-
-
-def parse_state(state: dict[str, Any], optimizer: str, model: type[M]) -> M:
-    """Validate a dumped state.
-
-    Args:
-        state: Result of `Optimizer.dump`.
-        optimizer: Name of the method, for messages.
-        model: Model of the state.
-
-    Returns:
-        The state as an instance of the model.
-
-    Raises:
-        ValueError: The state is not valid; names the field.
-    """
-    try:
-        return model.model_validate(state)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise ValueError(f"not a state of {optimizer}: {field}: {message_of(first)}") from error
-
-
-def matrix(rows: list[list[float]], shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
-    """Convert nested lists of a dumped state to an array.
-
-    Args:
-        rows: n lists of d numbers.
-        shape: Expected shape (n, d).
-        name: Name of the field, for messages.
-
-    Returns:
-        (n, d), a new array.
-
-    Raises:
-        ValueError: The rows have another shape.
-    """
-    if len(rows) != shape[0] or any(len(row) != shape[1] for row in rows):
-        raise ValueError(f"{name}: expected {shape[0]} rows of {shape[1]} numbers")
-    return np.array(rows, dtype=np.float64).reshape(shape)

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
-from gaitswarm.services.optimizer.search.generational import (
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.search.stateful import (
+    Fitness,
     Generational,
     GenerationState,
-    Row,
-    Worth,
-    of_worth,
-    worth,
+    Numbers,
+    Points,
 )
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
-from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
-from gaitswarm.services.optimizer.search.space import Space
+
+Floats = NDArray[np.float64]
 
 _SCATTER: Final = 1
 _MOVE: Final = 2
@@ -74,17 +74,13 @@ class PsoSettings(SwarmSettings):
 
 
 class _SwarmState(GenerationState):
-    """The dumped state.
+    """State of a swarm; `best_fitness` is +inf for a particle that has not succeeded yet."""
 
-    Attributes:
-        best_fitness: None where a particle has not succeeded yet.
-        informed_since: Generation whose random numbers determine the informants.
-    """
-
-    velocities: list[Row]
-    best_positions: list[Row]
-    best_fitness: Worth
+    velocities: Numbers
+    best_positions: Points
+    best_fitness: Fitness
     informed_since: NonNegativeInt = 0
+    """Generation whose random numbers determine the informants."""
 
 
 class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
@@ -93,82 +89,60 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
     It moves in the continuous box, in the variables' own units. Positions stay real in integer
     variables, so that a particle keeps its velocity while it crosses the width of an integer. A
     velocity is the change of position in one iteration.
-
-    Attributes:
-        best_positions: (particles, d) best position of each particle.
-        best_fitness: (particles,) fitness of these, +inf for a particle that never succeeded.
     """
 
     state_model = _SwarmState
     schema_version = 2
 
-    def __init__(self, settings: SwarmSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a swarm that has not been asked yet."""
-        super().__init__(settings, space, budget, seed)
-        self._velocities = np.zeros((settings.particles, space.dimension))
-        self.best_positions = np.tile(space.low, (settings.particles, 1))
-        self.best_fitness = np.full(settings.particles, np.inf)
-        self._informed_since = 0
+    def begin(self) -> None:
+        particles, state = self.settings.particles, self.state
+        state.velocities = np.zeros((particles, self.space.dimension))
+        state.best_positions = np.tile(self.space.low, (particles, 1))
+        state.best_fitness = np.full(particles, np.inf)
 
-    def propose(self) -> NDArray[np.float64]:
-        """Sample the swarm, or move it."""
-        return self._moved() if self.generations else self._scattered()
+    def propose(self) -> Floats:
+        return self._moved() if self.state.generations else self._scattered()
 
-    def learn(self, positions: NDArray[np.float64], fitness: NDArray[np.float64]) -> None:
-        """Update the best of each particle."""
-        self._remember(self.generations, positions, fitness)
+    def learn(self, positions: Floats, fitness: Floats) -> None:
+        self._remember(self.state.generations, positions, fitness)
 
-    def rejudge(
-        self, generations: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
-    ) -> None:
-        """Recompute the best of each particle from another fitness of its positions.
-
-        Positions and velocities stay.
-        """
-        shape = self.best_positions.shape
+    def rejudge(self, generations: Sequence[tuple[Floats, Floats]]) -> None:
+        """Recompute the best of each particle; positions and velocities stay."""
+        state = self.state
+        shape = state.best_positions.shape
         whole = all(positions.shape == shape for positions, _ in generations)
-        if len(generations) != self.generations or self.iteration != self.generations or not whole:
+        done = state.generations
+        if len(generations) != done or state.iteration != done or not whole:
             raise ValueError(f"{self.settings.name} has not received feedback in whole swarms")
-        self.best_fitness = np.full(shape[0], np.inf)
-        self._informed_since = 0
+        state.best_fitness = np.full(shape[0], np.inf)
+        state.informed_since = 0
         for number, (positions, fitness) in enumerate(generations):
             self._remember(number, positions, fitness)
 
-    def _remember(
-        self, generation: int, positions: NDArray[np.float64], fitness: NDArray[np.float64]
-    ) -> None:
-        if not fitness.min() < self.best_fitness.min():
-            self._informed_since = generation + 1
-        better = fitness < self.best_fitness
-        self.best_positions[better] = positions[better]
-        self.best_fitness[better] = fitness[better]
+    def _remember(self, generation: int, positions: Floats, fitness: Floats) -> None:
+        state = self.state
+        if not fitness.min() < state.best_fitness.min():
+            state.informed_since = generation + 1
+        better = fitness < state.best_fitness
+        state.best_positions[better] = positions[better]
+        state.best_fitness[better] = fitness[better]
 
-    def memory(self) -> dict[str, Any]:
-        """Give velocities and bests, and since when informants are what they are."""
-        memory = {
-            "velocities": self._velocities.tolist(),
-            "best_positions": self.best_positions.tolist(),
-            "best_fitness": worth(self.best_fitness),
-        }
-        drawn = self.settings.topology == "random"
-        return memory | {"informed_since": self._informed_since} if drawn else memory
+    def dump(self) -> dict[str, Any]:
+        unused = set() if self.settings.topology == "random" else {"informed_since"}
+        return self.state.model_dump(exclude=unused)
 
-    def recall(self, state: _SwarmState) -> None:
-        """Take on what `memory` gave."""
-        shape = self.best_positions.shape
+    def _check(self, state: _SwarmState) -> None:
+        super()._check(state)
+        particles = self.settings.particles
         # The first generation may be of more start positions than there are particles.
-        asked = shape[0] if state.generations else max(shape[0], len(self._start))
-        if len(state.positions) not in (0, asked):
-            raise ValueError(f"positions: expected {shape[0]} rows of {shape[1]} numbers")
-        velocities = matrix(state.velocities, shape, "velocities")
-        best = matrix(state.best_positions, shape, "best_positions")
-        if len(state.best_fitness) != shape[0]:
-            raise ValueError(f"best_fitness: {len(state.best_fitness)} values, not {shape[0]}")
-        self.best_positions = self.inside(best, "best_positions")
-        self._velocities, self.best_fitness = velocities, of_worth(state.best_fitness)
-        self._informed_since = state.informed_since
+        most = particles if state.generations else max(particles, len(self._start))
+        if len(state.positions) not in (0, most):
+            raise ValueError(f"positions: expected {particles} rows")
+        for name in ("velocities", "best_positions", "best_fitness"):
+            if getattr(state, name).shape != getattr(self.state, name).shape:
+                raise ValueError(f"{name}: expected those of {particles} particles")
 
-    def _scattered(self) -> NDArray[np.float64]:
+    def _scattered(self) -> Floats:
         """Sample uniform positions with small random velocities.
 
         Small, because a fast swarm spends its first steps at the walls; not zero, because the
@@ -177,30 +151,31 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         draws = self._draw(purpose=_SCATTER)
         space = self.space
         largest = min(_INITIAL_VELOCITY, self.settings.velocity_limit) * space.span
-        self._velocities = (2.0 * draws[1] - 1.0) * largest
+        self.state.velocities = (2.0 * draws[1] - 1.0) * largest
         return space.from_unit(draws[0])
 
-    def _moved(self) -> NDArray[np.float64]:
+    def _moved(self) -> Floats:
         own, swarm = self._draw(purpose=_MOVE)
-        settings, space, positions = self.settings, self.space, self.positions
-        velocities = self._inertia() * self._velocities
-        known = np.isfinite(self.best_fitness)
-        to_own_best = np.where(known[:, np.newaxis], self.best_positions - positions, 0.0)
+        settings, space, state = self.settings, self.space, self.state
+        positions = state.positions
+        velocities = self._inertia() * state.velocities
+        known = np.isfinite(state.best_fitness)
+        to_own_best = np.where(known[:, np.newaxis], state.best_positions - positions, 0.0)
         velocities += settings.cognitive * own * to_own_best
         leader = self._leaders()
-        to_leader = self.best_positions[leader] - positions
+        to_leader = state.best_positions[leader] - positions
         velocities += settings.social * swarm * np.where(known[leader, np.newaxis], to_leader, 0.0)
         fastest = settings.velocity_limit * space.span
         velocities = np.clip(velocities, -fastest, fastest)
         at_bounds = absorb if settings.bounds == "absorb" else reflect
-        moved, self._velocities = at_bounds(
+        moved, state.velocities = at_bounds(
             positions + velocities, velocities, space.low, space.high
         )
         return moved
 
     def _leaders(self) -> NDArray[np.intp]:
         """Return (particles,) the best informant of each particle."""
-        particles, fitness = self.settings.particles, self.best_fitness
+        particles, fitness = self.settings.particles, self.state.best_fitness
         if self.settings.topology == "global":
             return np.full(particles, np.argmin(fitness))
         if self.settings.topology == "ring":
@@ -208,7 +183,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         draws = swarm_uniform(
             self.seed,
             _INFORM,
-            iteration=self._informed_since,
+            iteration=self.state.informed_since,
             particles=particles,
             count=self.settings.informants,
         )
@@ -217,36 +192,36 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
     def _inertia(self) -> float:
         """Return the inertia: linear over the planned iterations, then constant."""
         planned = math.ceil(self.budget / self.settings.particles)
-        share = min(self.generations / max(planned - 1, 1), 1.0)
+        share = min(self.state.generations / max(planned - 1, 1), 1.0)
         start, end = self.settings.inertia_start, self.settings.inertia_end
         return start + share * (end - start)
 
-    def _draw(self, *, purpose: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _draw(self, *, purpose: int) -> tuple[Floats, Floats]:
         """Draw two numbers in [0, 1) per particle and coordinate: twice (particles, d)."""
-        particles, d = self.best_positions.shape
+        particles, d = self.state.best_positions.shape
         draws = swarm_uniform(
-            self.seed, purpose, iteration=self.generations, particles=particles, count=2 * d
+            self.seed, purpose, iteration=self.state.generations, particles=particles, count=2 * d
         )
         return draws[:, :d], draws[:, d:]
 
 
 def absorb(
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    positions: Floats,
+    velocities: Floats,
+    low: Floats,
+    high: Floats,
+) -> tuple[Floats, Floats]:
     """Stop particles at the walls."""
     inside = np.clip(positions, low, high)
     return inside, np.where(inside == positions, velocities, 0.0)
 
 
 def reflect(
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    positions: Floats,
+    velocities: Floats,
+    low: Floats,
+    high: Floats,
+) -> tuple[Floats, Floats]:
     """Reflect particles at the walls, repeatedly if needed."""
     span = high - low
     outside = (positions < low) | (positions > high)
@@ -270,7 +245,7 @@ def ring(particles: int) -> Links:
     return np.tile(every, 3), np.concatenate(informed)
 
 
-def random_informants(draws: NDArray[np.float64]) -> Links:
+def random_informants(draws: Floats) -> Links:
     """Link each particle with random ones (standard swarm of 2011, Clerc 2012).
 
     A particle may be drawn twice, so the number of informants varies.
@@ -281,7 +256,7 @@ def random_informants(draws: NDArray[np.float64]) -> Links:
     return np.concatenate([every, np.repeat(every, k)]), np.concatenate([every, informed.ravel()])
 
 
-def leaders(links: Links, fitness: NDArray[np.float64]) -> NDArray[np.intp]:
+def leaders(links: Links, fitness: Floats) -> NDArray[np.intp]:
     """Return the best informant of each particle."""
     informs, informed = links
     worst_first = np.argsort(-fitness[informs], kind="stable")

@@ -62,7 +62,7 @@ def pso_ps(
             judged.new(space.designs(start.positions))
             _begin(swarm, start)
             start = None
-        while swarm.generations < iterations:
+        while swarm.state.generations < iterations:
             positions = swarm.ask()
             judged.new(space.designs(positions))
             swarm.tell((yield positions))
@@ -87,11 +87,12 @@ def _begin(swarm: ParticleSwarm, start: Start) -> None:
 
 def best_members(swarm: ParticleSwarm, count: int) -> tuple[Floats, Floats]:
     """Return the best distinct designs of a swarm and their fitness."""
-    designs = swarm.space.designs(swarm.best_positions)
-    order = np.argsort(swarm.best_fitness, kind="stable")
-    order = order[np.isfinite(swarm.best_fitness[order])]
+    fitness = swarm.state.best_fitness
+    designs = swarm.space.designs(swarm.state.best_positions)
+    order = np.argsort(fitness, kind="stable")
+    order = order[np.isfinite(fitness[order])]
     order = order[Judged(swarm.space).new(designs[order])][:count]
-    return designs[order], swarm.best_fitness[order]
+    return designs[order], fitness[order]
 
 
 def _in_turns(searches: list[Polls]) -> Polls:

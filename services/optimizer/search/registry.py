@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from operator import attrgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
@@ -17,22 +19,102 @@ from gaitswarm.services.optimizer.search.differential_evolution import (
     DifferentialEvolution,
 )
 from gaitswarm.services.optimizer.search.hype import Hype, HypeSettings
-from gaitswarm.services.optimizer.search.method import Method, from_generator, settings_of
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings, pso_ps
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings, random_search
+from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.plugins import (
+    MISSING,
     KnownName,
     Plugin,
     PluginSettings,
     Registry,
     check_is,
     check_name,
+    version_of,
 )
 
 Floats = NDArray[np.float64]
+
+Create = Callable[[Any, Space, int, int], Optimizer]
+"""(settings, space, budget [evaluations], seed) -> an optimizer before its first ask."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A search method."""
+
+    settings: type[SearchSettings]
+    summary: str
+    """One line for lists of methods, with the source."""
+    create: Create
+    multi_objective: bool = False
+    """Whether it receives objective vectors instead of fitness values."""
+    replays: bool = False
+    """Whether its state is the complete feedback, which bounds the length of a job."""
+    uses_start: bool = False
+    """Whether it learns from the designs that a job starts from. Otherwise these designs are
+    evaluated first and the method begins as if there were none.
+    """
+    extra: str = ""
+    """Optional dependencies of gaitswarm that it needs, as in `gaitswarm[extra]`."""
+    libraries: tuple[str, ...] = ()
+    """Distributions that its results depend on, besides those that every job depends on. Their
+    versions are recorded, and a job resumes with the same versions only.
+    """
+
+    def versions(self) -> dict[str, str]:
+        """Return the installed versions of its libraries, "none" for a missing one."""
+        return {name: version_of(name) for name in self.libraries}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Libraries that are not installed."""
+        return tuple(name for name, version in self.versions().items() if version == MISSING)
+
+    @property
+    def remedy(self) -> str:
+        """Command that installs what is missing."""
+        packages = f"'gaitswarm[{self.extra}]'" if self.extra else " ".join(self.missing)
+        return f"pip install {packages}"
+
+
+def from_generator(
+    settings: type[SearchSettings],
+    summary: str,
+    search: Callable[..., Proposals],
+    *,
+    extra: str = "",
+    libraries: tuple[str, ...] = (),
+) -> Method:
+    """Make a method of a generator function that yields positions and receives their fitness.
+
+    The state of such a method is the feedback it received, which is replayed when a job resumes.
+
+    Args:
+        settings: Model of its settings.
+        summary: One line for lists of methods, with the source.
+        search: Function of (settings, space, budget, random) that returns the generator. A
+            parameter `start`, None by default, receives a `Start`: evaluated designs to begin from.
+        extra: As in `Method`.
+        libraries: As in `Method`.
+    """
+
+    def create(settings: SearchSettings, space: Space, budget: int, seed: int) -> Optimizer:
+        return Replayed(search, settings, space, budget, seed)
+
+    return Method(
+        settings,
+        summary,
+        create,
+        replays=True,
+        uses_start="start" in inspect.signature(search).parameters,
+        extra=extra,
+        libraries=libraries,
+    )
+
 
 LONGEST_REPLAY: Final = 250_000
 """Largest budget [evaluations] of a job whose search is replayed when it resumes."""
@@ -121,7 +203,7 @@ else:
         | PsoPsSettings
         | PsoSettings
         | RandomSearchSettings,
-        PluginSettings(METHODS, settings_of, "/v1/optimizers"),
+        PluginSettings(METHODS, attrgetter("settings"), "/v1/optimizers"),
     ]
     """Settings of any method, distinguished by their `name`."""
 

@@ -8,21 +8,16 @@ from collections import OrderedDict
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from hashlib import blake2b
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt
+from pydantic import PositiveInt
 
-from gaitswarm.services.optimizer.search.generational import Worth, of_worth, worth
-from gaitswarm.services.optimizer.search.optimizer import (
-    SearchSettings,
-    checked_fitness,
-    checked_start,
-    parse_state,
-)
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_start
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.stateful import Fitness, SearchState, Stateful
 
 Floats = NDArray[np.float64]
 
@@ -66,15 +61,11 @@ _CACHED: Final = 32
 """Running searches that a process caches, so that continuing does not replay them."""
 
 
-class _FeedbackState(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+class _FeedbackState(SearchState):
+    """State of a replayed search: the feedback on all proposals."""
 
-    optimizer: str
-    schema_version: Literal[1]
-    iteration: NonNegativeInt
-    asked: NonNegativeInt
     budget: PositiveInt
-    told: Worth  # codespell:ignore told
+    told: Fitness  # codespell:ignore told
 
 
 @dataclass(slots=True)
@@ -94,7 +85,7 @@ class _Course:
                 self.fitness = []
 
 
-class Replayed:
+class Replayed(Stateful[_FeedbackState]):
     """An optimizer over a generator. Loading a state replays the feedback.
 
     The budget of the first run stays part of the state, also in a job that is extended, because
@@ -107,80 +98,54 @@ class Replayed:
     def __init__(
         self, search: Search[S], settings: S, space: Space, budget: int, seed: int
     ) -> None:
-        """Create a search before its first ask."""
-
-        def begin(budget: int, start: Floats) -> Proposals:
-            random = RandomNumbers(seed, _SEARCH)
-            if len(start):
-                return _after(start, search, settings, space, budget, random)
-            return search(settings, space, budget, random)
-
-        self._begin: Final[Callable[[int, Floats], Proposals]] = begin
+        state = _FeedbackState(
+            optimizer=settings.name,
+            schema_version=1,
+            iteration=0,
+            asked=0,
+            budget=budget,
+            told=np.empty(0),  # codespell:ignore told
+        )
+        super().__init__(settings.particles, state)
+        self._search: Final[Search[S]] = search
         self._settings: Final = settings
-        self._space: Final = space
-        self._place: Final = repr((settings.model_dump_json(), space.axes, seed))
+        self.space: Space = space
+        self._seed: Final = seed
         self._start = np.empty((0, space.dimension))
-        self._budget = budget
-        self.iteration = 0
-        self._asked = 0
-        self._feedback: list[float] = []
         self._course: _Course | None = None
 
     @property
     def evaluations(self) -> int:
-        """Number of positions evaluated so far."""
         return len(self._feedback)
+
+    @property
+    def _feedback(self) -> Floats:
+        return self.state.told  # codespell:ignore told
 
     def start_from(self, positions: Floats) -> None:
         """Evaluate positions before the method begins."""
-        begun = bool(self._feedback or self._asked)
-        self._start = checked_start(positions, self._space, begun=begun)
+        begun = bool(len(self._feedback) or self.state.asked)
+        self._start = checked_start(positions, self.space, begun=begun)
         self._course = None
 
-    def ask(self, most: int | None = None) -> Floats:
-        """Return the positions to evaluate next; the same ones until their fitness is known."""
-        course = self._running()
-        done = len(course.fitness)
-        if not self._asked:
-            limit = self._settings.particles
-            limit = limit if most is None else min(most, limit)
-            self._asked = min(limit, len(course.positions) - done)
-        return course.positions[done : done + self._asked].copy()
-
-    def tell(self, fitness: Floats) -> None:
-        """Receive the fitness of the positions asked for last."""
-        values = checked_fitness(fitness, self._asked)
-        self._running().tell(values)
-        self._feedback.extend(values.tolist())
-        self.iteration += 1
-        self._asked = 0
-
     def dump(self) -> dict[str, Any]:
-        """Return the complete state."""
         if self._course is not None:
             _COURSES.put(self._key(), self._course)
             self._course = None
-        return {
-            "optimizer": self._settings.name,
-            "schema_version": 1,
-            "iteration": self.iteration,
-            "asked": self._asked,
-            "budget": self._budget,
-            "told": worth(self._feedback),  # codespell:ignore told
-        }
+        return super().dump()
 
     def load(self, state: dict[str, Any]) -> None:
-        """Restore a state."""
-        name = self._settings.name
-        dumped = parse_state(state, name, _FeedbackState)
-        if dumped.optimizer != name:
-            raise ValueError(f"not a state of {name}: optimizer: {dumped.optimizer}")
-        if dumped.asked > self._settings.particles:
-            raise ValueError(f"asked: {dumped.asked} positions, more than {name} asks for at once")
+        super().load(state)
         self._course = None
-        self.iteration, self._asked = dumped.iteration, dumped.asked
-        self._budget = dumped.budget
-        self._feedback = of_worth(dumped.told).tolist()  # codespell:ignore told
+
+    def _waiting(self) -> Floats:
+        course = self._running()
+        return course.positions[len(course.fitness) :]
+
+    def _answer(self, fitness: Floats) -> None:
+        self._running().tell(fitness)
+        feedback = np.concatenate([self._feedback, fitness])
+        self.state.told = feedback  # codespell:ignore told
 
     def _running(self) -> _Course:
         if self._course is None:
@@ -188,15 +153,23 @@ class Replayed:
         return self._course
 
     def _replay(self) -> _Course:
-        proposals = self._begin(self._budget, self._start)
+        proposals = self._proposals(RandomNumbers(self._seed, _SEARCH))
         course = _Course(proposals, _proposal(next(proposals)), [])
-        course.tell(np.array(self._feedback))
+        course.tell(self._feedback)
         return course
 
+    def _proposals(self, random: RandomNumbers) -> Proposals:
+        settings, space, start = self._settings, self.space, self._start
+        search: Callable[..., Proposals] = self._search
+        if not len(start):
+            return search(settings, space, self.state.budget, random)
+        return _after(start, search, settings, space, self.state.budget, random)
+
     def _key(self) -> bytes:
-        place = f"{self._place} {self._budget} {len(self._start)}".encode()
-        feedback = np.array(self._feedback).tobytes()
-        return blake2b(place + self._start.tobytes() + feedback, digest_size=16).digest()
+        name, axes = self._settings.model_dump_json(), self.space.axes
+        place = repr((name, axes, self._seed, self.state.budget, len(self._start)))
+        key = place.encode() + self._start.tobytes() + self._feedback.tobytes()
+        return blake2b(key, digest_size=16).digest()
 
 
 class _CourseCache:

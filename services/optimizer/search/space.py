@@ -19,16 +19,12 @@ _RESOLUTION: Final = 2.0**40
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One variable of a search.
-
-    Attributes:
-        low: Lower bound in the variable's own unit; 0 for a categorical variable.
-        high: Upper bound, above `low`; for a categorical variable the number of choices minus 1.
-        kind: Kind of its values.
-    """
+    """One variable of a search."""
 
     low: float
+    """In the variable's own unit; 0 for a categorical variable."""
     high: float
+    """Above `low`; for a categorical variable the number of choices minus 1."""
     kind: Kind = "continuous"
 
 
@@ -40,35 +36,22 @@ class Space:
     index of the choice in whose equal share of the range the point lies. A *unit position* is a
     position scaled to [0, 1] in every coordinate.
 
-    Attributes:
-        axes: The d variables.
-        low: (d,) lower bounds.
-        high: (d,) upper bounds.
-        span: (d,) high - low.
-        integer: (d,) true for integer variables.
-        categorical: (d,) true for categorical variables.
+    Arguments of the methods: `positions` is (n, d), inside the bounds; `designs` is (n, d), as
+    `Space.designs` returns them; `unit` is (n, d); `low` is (d,) and `high` is (d,).
     """
 
     def __init__(self, axes: Sequence[Axis]) -> None:
-        """Create a box of axes."""
         self.axes: Final = tuple(axes)
         self.low: Final[Floats] = np.array([axis.low for axis in axes], dtype=np.float64)
         self.high: Final[Floats] = np.array([axis.high for axis in axes], dtype=np.float64)
         self.span: Final[Floats] = self.high - self.low
+        # (d,) masks
         self.integer: Final = np.array([axis.kind == "integer" for axis in axes])
         self.categorical: Final = np.array([axis.kind == "categorical" for axis in axes])
 
     @classmethod
     def continuous(cls, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Space:
-        """Create a box of continuous variables.
-
-        Args:
-            low: (d,) lower bounds.
-            high: (d,) upper bounds.
-
-        Returns:
-            The box.
-        """
+        """Create a box of continuous variables."""
         return cls([Axis(float(a), float(b)) for a, b in zip(low, high, strict=True)])
 
     @property
@@ -77,14 +60,7 @@ class Space:
         return len(self.axes)
 
     def designs(self, positions: Floats) -> Floats:
-        """Convert positions to designs.
-
-        Args:
-            positions: (n, d), inside the bounds.
-
-        Returns:
-            (n, d): integer variables rounded, categorical variables as indices of choices.
-        """
+        """Convert positions to (n, d) designs."""
         columns = np.array(positions, dtype=np.float64)
         columns[:, self.integer] = np.rint(columns[:, self.integer])
         for j in np.flatnonzero(self.categorical):
@@ -94,14 +70,7 @@ class Space:
         return columns
 
     def positions(self, designs: Floats) -> Floats:
-        """Convert designs to positions in the middle of the points that represent them.
-
-        Args:
-            designs: (n, d), as `designs` returns them.
-
-        Returns:
-            (n, d) positions that `designs` converts back to the same designs.
-        """
+        """Convert designs to the positions in the middle of those that represent them."""
         points = np.array(designs, dtype=np.float64)
         for j in np.flatnonzero(self.categorical):
             last = self.high[j]
@@ -109,37 +78,17 @@ class Space:
         return points
 
     def from_unit(self, unit: Floats) -> Floats:
-        """Convert unit positions to positions, clipped to the box.
-
-        Args:
-            unit: (n, d).
-
-        Returns:
-            (n, d), inside the bounds.
-        """
+        """Convert unit positions to positions, clipped to the box."""
         return np.clip(self.low + unit * self.span, self.low, self.high)
 
     def to_unit(self, positions: Floats) -> Floats:
-        """Convert positions to unit positions.
-
-        Args:
-            positions: (n, d), inside the bounds.
-
-        Returns:
-            (n, d) in [0, 1].
-        """
+        """Convert positions to unit positions."""
         return (positions - self.low) / self.span
 
     def evenly(self, unit: Floats) -> Floats:
         """Convert unit positions to positions, giving every integer value the same width.
 
         `from_unit` gives the first and last integer half the width of the others.
-
-        Args:
-            unit: (n, d) in [0, 1).
-
-        Returns:
-            (n, d), inside the bounds.
         """
         points = self.from_unit(unit)
         values = self.low + np.floor(unit * (self.span + 1.0))
@@ -150,7 +99,6 @@ class Judged:
     """The designs evaluated so far, so that none is asked for twice."""
 
     def __init__(self, space: Space) -> None:
-        """Begin without a design."""
         self._space: Final = space
         self._seen: set[bytes] = set()
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from gaitswarm.cli.exit_codes import JobEnded
-from gaitswarm.cli.output import note, show
+from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.progress import show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, worth
 from gaitswarm.designs import SimulationRequest
@@ -35,9 +35,7 @@ from gaitswarm.simulation import run_simulation
 
 if TYPE_CHECKING:
     from gaitswarm.cli.inputs.options import WorkerOptions
-    from gaitswarm.cli.output import Printed
     from gaitswarm.cli.progress import Progress
-    from gaitswarm.cli.rich_table import Table
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
@@ -256,9 +254,7 @@ def _resume_hint(job_id: str, place: str) -> str:
     return f"to resume, run\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(
-    job: JobView, place: str, *, compare: bool, others: Mapping[str, JobView]
-) -> Iterator[Table | str]:
+def _report(job: JobView, place: str, *, compare: bool, others: Mapping[str, JobView]) -> Parts:
     if job.best is None:
         yield "no design walks in every scenario"
     else:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -22,21 +23,15 @@ from typer.main import get_command
 from gaitswarm.cli.commands import (
     administration,
     analysis,
-    bench,
-    calibrate,
     certify,
-    compare,
+    designs,
     evidence,
-    firmware,
-    gaits,
     jobs,
     measurements,
     optimize,
     plot,
     robot,
-    robustness,
     serve,
-    simulate,
 )
 from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
 from gaitswarm.cli.inputs.options import expanded
@@ -49,28 +44,21 @@ from gaitswarm.cli.output import (
 )
 
 _GROUPS: Final = {
-    "robot": (
-        "Create a robot from a URDF file, and check it.",
-        {"init": robot.init, "check": robot.check},
-    ),
+    "robot": ("Create a robot from a URDF file, and check it.", (robot.init, robot.check)),
     "plot": (
         "Draw a job's convergence or front, a controller's surface, or designs' robustness.",
-        {name: getattr(plot, name) for name in ("convergence", "front", "surface", "robustness")},
+        (plot.convergence, plot.front, plot.surface, plot.robustness),
     ),
     "token": (
         "Create, list and revoke tokens for access to a server.",
-        {
-            "create": administration.create,
-            "list": administration.list_tokens,
-            "revoke": administration.revoke,
-        },
+        (administration.create, administration.list_tokens, administration.revoke),
     ),
     "db": (
         "Upgrade, check, back up, restore and prune the database.",
-        {
-            name: getattr(administration, name)
-            for name in ("upgrade", "check", "backup", "restore", "prune")
-        },
+        (
+            *(administration.upgrade, administration.check, administration.backup),
+            *(administration.restore, administration.prune),
+        ),
     ),
 }
 """Help texts and commands of groups."""
@@ -78,7 +66,7 @@ _GROUPS: Final = {
 _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
     "Start here": (
         *(optimize.optimize, serve.serve, jobs.submit, jobs.list_jobs, jobs.status, jobs.best),
-        *(simulate.simulate, "robot"),
+        *(designs.simulate, "robot"),
     ),
     "Jobs": (
         *(jobs.watch, jobs.history, jobs.pause, jobs.resume, jobs.extend, jobs.prioritize),
@@ -89,15 +77,15 @@ _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
         *(analysis.failures, analysis.preferences, "plot"),
         *(evidence.export, evidence.evidence, evidence.verify),
     ),
-    "Designs": (compare.compare, certify.certify, robustness.robustness, firmware.firmware),
+    "Designs": (designs.compare, certify.certify, designs.robustness, designs.firmware),
     "Robots and measurements": (
-        *(gaits.gaits, gaits.mjcf, measurements.record, measurements.recordings),
-        *(measurements.identify, measurements.parameters, calibrate.calibrate, calibrate.targets),
-        *(measurements.validate, measurements.synthesize),
+        *(robot.gaits, robot.mjcf, measurements.record, measurements.recordings),
+        *(measurements.identify, measurements.parameters, measurements.calibrate),
+        *(measurements.targets, measurements.validate, measurements.synthesize),
     ),
     "Installation": (
-        *(optimize.optimizers, optimize.cases, optimize.plugins, "token", administration.audit),
-        *("db", bench.bench),
+        *(administration.optimizers, administration.cases, administration.plugins, "token"),
+        *(administration.audit, "db", administration.bench),
     ),
 }
 """Commands and groups in the order of the help text, by heading."""
@@ -192,8 +180,8 @@ def commands(only: str | None = None) -> Callable[..., object]:
         if isinstance(entry, str):
             text, members = _GROUPS[entry]
             group = typer.Typer(help=text)
-            for member, command in members.items():
-                group.command(member)(expanded(command))
+            for command in members:
+                group.command(_name(command))(expanded(command))
             app.add_typer(group, name=entry)
         else:
             app.command(name)(expanded(entry))
@@ -201,7 +189,7 @@ def commands(only: str | None = None) -> Callable[..., object]:
 
 
 def _name(entry: Callable[..., object] | str) -> str:
-    return entry if isinstance(entry, str) else entry.__name__.removesuffix("_jobs")
+    return entry if isinstance(entry, str) else re.sub("_(jobs|tokens)$", "", entry.__name__)
 
 
 def run(arguments: Sequence[str]) -> int:

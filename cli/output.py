@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import warnings
@@ -47,10 +46,13 @@ def print_text(text: str) -> None:
     sys.stdout.write(f"{text}\n")
 
 
-Printed = tuple[Any, "Iterable[Any] | str"]
-"""What a command prints: a document for --json, and otherwise text and tables.
+Parts = Iterator[Any]
+"""Texts and tables that a command prints."""
 
-The document is a model, an iterator of models, or made of dicts and lists.
+Printed = tuple[Any, Iterable[Any] | str]
+"""Result of a command: a document for --json, and otherwise texts and tables.
+
+The document is an iterator of models, or what Pydantic can serialize.
 """
 
 
@@ -73,10 +75,10 @@ def print_document(document: Any) -> None:
     if isinstance(document, Iterator):
         write_json_items(sys.stdout, document)
         sys.stdout.write("\n")
-    elif isinstance(document, dict | list):
-        print_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
     else:
-        print_text(document.model_dump_json(indent=2))
+        from pydantic_core import to_json
+
+        print_text(to_json(document, indent=2, inf_nan_mode="null").decode())
 
 
 def write_json_items(out: TextIO, views: Iterable[BaseModel], *, indent: int = 0) -> None:

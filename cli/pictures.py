@@ -1,4 +1,4 @@
-"""Pictures of jobs, controllers and robots, drawn without a display."""
+"""Pictures of jobs, controllers, robots and measured walks, drawn without a display."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gaitswarm.cli.files import replacing
+from gaitswarm.cli.output import note
 from gaitswarm.cli.tables import SHORT
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.validation import Tolerance, amplitude_spectrum, channels_of_link, columns_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,21 +31,60 @@ if TYPE_CHECKING:
     )
     from gaitswarm.sim.controllers.surface import Surface
     from gaitswarm.sim.drives import WalkFigures
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
+    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.validation import Comparison
     from gaitswarm.views.robots import RobotCheckView
+
+_STYLE: Final[dict[Any, Any]] = {
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "figure.constrained_layout.use": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+}
 
 _FORMATS: Final = ("png", "svg", "pdf")
 _INK: Final = "#1f3a5f"
 _ACCENT: Final = "#d1495b"
+_BAND: Final = "#9db8d9"
+
+_HIGHEST: Final = 20.0
+"""Highest frequency of drawn spectra [Hz]; walking is below."""
+
+_LARGEST: Final = 1.0
+"""RMAE at which bars are truncated."""
+
+_COLOURS: Final = {
+    Tolerance.GREEN: "#3a9d5d",
+    Tolerance.YELLOW: "#e3b505",
+    Tolerance.ORANGE: "#ef7b2d",
+    Tolerance.RED: "#cc2936",
+    Tolerance.PURPLE: "#7b2d8b",
+}
+
+
+def _figure(width: float, height: float) -> Figure:
+    """Return a figure of a size [inch]."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    mpl.rcParams.update(_STYLE)
+    return Figure(figsize=(width, height))
 
 
 def draw_surface(surface: Surface, *, title: str) -> Figure:
     """Draw the output over angle error and motor current, from the robot's lookup table."""
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
     error, current = (surface.inputs[name].values for name in ("error", "current"))
     highest = abs(surface.table).max()
-    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    figure = _figure(8.0, 5.0)
     axes: Axes3D = figure.add_subplot(projection="3d")
     drawn = axes.plot_surface(
         error[:, None] / 1000.0,
@@ -69,32 +113,62 @@ def draw_surface(surface: Surface, *, title: str) -> Figure:
 
 def draw_comparison(figures: Sequence[WalkFigures]) -> Figure:
     """Draw speed, power and effectivity of every drive, grouped by scenario."""
-    from matplotlib.figure import Figure
-
     scenarios = list(dict.fromkeys(f.scenario for f in figures))
     drives = list(dict.fromkeys(f.drive for f in figures))
     by_walk = {(f.scenario, f.drive): f for f in figures}
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    figure = _figure(8.0, 7.0)
     panels = figure.subplots(3, 1, sharex=True)
     quantities = (("speed", "m/s"), ("power", "W"), ("effectivity", "m/J"))
-    width = 0.8 / len(drives)
     for axes, (name, unit) in zip(panels, quantities, strict=True):
-        for k, drive in enumerate(drives):
-            heights = [getattr(by_walk[scenario, drive], name) for scenario in scenarios]
-            # A drive that failed has no bar.
-            axes.bar(
-                [n + (k - (len(drives) - 1) / 2) * width for n in range(len(scenarios))],
-                [math.nan if height is None else height for height in heights],
-                width,
-                label=drive,
-            )
+        heights = {
+            drive: _floats([getattr(by_walk[scenario, drive], name) for scenario in scenarios])
+            for drive in drives
+        }
+        _draw_bars(axes, scenarios, heights)
         axes.set_ylabel(f"{name}  [{unit}]")
-        axes.grid(visible=True, axis="y", color="0.9", lw=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-    panels[-1].set_xticks(range(len(scenarios)), scenarios, rotation=20, ha="right")
-    panels[0].legend(frameon=False, ncols=len(drives), loc="lower left", bbox_to_anchor=(0, 1))
+    panels[0].legend(ncols=len(drives), loc="lower left", bbox_to_anchor=(0, 1))
     return figure
+
+
+def draw_robustness(views: Mapping[str, RobustnessView], *, title: str) -> Figure:
+    """Draw the index with its interval by scenario, designs side by side (after fig. 4.8).
+
+    views: of the same scenarios, by label.
+    """
+    scenarios = list(next(iter(views.values())).scenarios)
+    heights, errors = {}, {}
+    for label, view in views.items():
+        indices = [*(view.scenarios[name].index for name in scenarios), view.index]
+        value, low, high = (
+            np.array(_floats([getattr(index, bound, None) for index in indices]))
+            for bound in ("value", "low", "high")
+        )
+        heights[label] = value
+        errors[label] = [value - low, high - value]
+    figure = _figure(8.0, 3.8)
+    axes = figure.add_subplot()
+    _draw_bars(axes, [*scenarios, "all"], heights, errors)
+    axes.set_ylabel("robustness index  [1]")
+    figure.suptitle(title, x=0.02, ha="left", weight="bold")
+    axes.legend(ncols=len(views), loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figure
+
+
+def _draw_bars(
+    axes: Axes,
+    groups: Sequence[str],
+    heights: Mapping[str, ArrayLike],
+    errors: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw bars by label side by side in each group; NaN has no bar."""
+    width = 0.8 / len(heights)
+    style = {"elinewidth": 1.0, "capsize": 2.0}
+    for k, (label, values) in enumerate(heights.items()):
+        places = np.arange(len(groups)) + (k - (len(heights) - 1) / 2) * width
+        error = None if errors is None else errors[label]
+        axes.bar(places, values, width, yerr=error, error_kw=style, label=label)
+    axes.set_xticks(range(len(groups)), groups, rotation=20, ha="right")
+    axes.grid(visible=False, axis="x")
 
 
 def save(figure: Figure, path: Path, option: str = "output") -> None:
@@ -106,13 +180,12 @@ def save(figure: Figure, path: Path, option: str = "output") -> None:
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     with replacing(path, option) as file:
         figure.savefig(file, format=kind, dpi=150, metadata=metadata)
+    note(f"picture written to {path}")
 
 
 def _floats(values: Sequence[float | None]) -> list[float]:
     return [math.nan if value is None else value for value in values]
 
-
-_GROUND: Final = "#9db8d9"
 
 _ACROSS: Final = {"from the side": (0, 2), "from above": (0, 1)}
 """Coordinates of the body's frame by panel: x forward, y left, z up."""
@@ -120,9 +193,7 @@ _ACROSS: Final = {"from the side": (0, 2), "from above": (0, 1)}
 
 def draw_robot(view: RobotCheckView) -> Figure:
     """Draw legs, feet, centre of mass, ground, and the support polygon."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 4.5), layout="constrained")
+    figure = _figure(9.0, 4.5)
     points = np.array([leg.points for leg in view.legs])
     for axes, (name, (across, up)) in zip(figure.subplots(1, 2), _ACROSS.items(), strict=True):
         hips, feet = points[:, 0], points[:, -1]
@@ -131,11 +202,9 @@ def draw_robot(view: RobotCheckView) -> Figure:
         if name == "from above":
             support = feet[_around(feet[:, :2])]
             label = "support polygon"
-            axes.fill(
-                support[:, 0], support[:, 1], color=_GROUND, alpha=0.25, ec=_GROUND, label=label
-            )
+            axes.fill(support[:, 0], support[:, 1], color=_BAND, alpha=0.25, ec=_BAND, label=label)
         else:
-            axes.axhline(feet[:, 2].min(), color=_GROUND, lw=1.5, label="ground, less the sole")
+            axes.axhline(feet[:, 2].min(), color=_BAND, lw=1.5, label="ground, less the sole")
         for leg, of_leg in zip(view.legs, points, strict=True):
             axes.plot(of_leg[:, across], of_leg[:, up], color=_INK, lw=1.6, marker="o", ms=3.0)
             axes.plot(of_leg[-1, across], of_leg[-1, up], "o", color=_INK, ms=7.0)
@@ -146,12 +215,10 @@ def draw_robot(view: RobotCheckView) -> Figure:
             mass[across], mass[up], "P", color=_ACCENT, ms=9.0, label="centre of mass", ls="none"
         )
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set_title(name, loc="left", weight="bold")
+        axes.set_title(name)
         axes.set_xlabel("x, forward  [m]")
         axes.set_ylabel("z, up  [m]" if up == 2 else "y, left  [m]")
-        axes.grid(visible=True, color="0.9", lw=0.6)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, fontsize=8, loc="best")
+        axes.legend(fontsize=8, loc="best")
     figure.suptitle(f"{view.name}: {len(view.legs)} legs, {view.mass:.3g} kg")
     return figure
 
@@ -174,12 +241,10 @@ def _around(points: np.ndarray) -> list[int]:
 
 def draw_front(view: FrontView, *, title: str) -> Figure:
     """Draw the front in every pair of objectives, with knees and winners under A, B and C."""
-    from matplotlib.figure import Figure
-
     names = [objective.name for objective in view.objectives]
     units = {objective.name: objective.unit for objective in view.objectives}
     last = len(names) - 1
-    figure = Figure(figsize=(10.0, 9.0), layout="constrained")
+    figure = _figure(10.0, 9.0)
     panels = figure.subplots(last, last, sharex="col", sharey="row", squeeze=False)
     for row, vertical in enumerate(names[1:]):
         for column, horizontal in enumerate(names[:-1]):
@@ -193,7 +258,7 @@ def draw_front(view: FrontView, *, title: str) -> Figure:
             if column == 0:
                 axes.set_ylabel(f"{SHORT[vertical]}  [{units[vertical]}]")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, loc="upper right", bbox_to_anchor=(0.97, 0.93))
+    figure.legend(handles, labels, loc="upper right", bbox_to_anchor=(0.97, 0.93))
     figure.suptitle(title, x=0.02, ha="left", weight="bold")
     return figure
 
@@ -207,73 +272,23 @@ def _draw_pair(axes: Axes, view: FrontView, horizontal: str, vertical: str) -> N
 
     scattered(view.designs, s=9, color=_INK, alpha=0.3, lw=0, label="front")
     scattered(view.knees, s=60, facecolor="none", edgecolor=_INK, label="knees")
-    for winner in view.winners:
-        if winner.preference != "job":
-            place = winner.objectives[horizontal], winner.objectives[vertical]
-            axes.plot(*place, "o", ms=4, color=_ACCENT, label=_once(axes, "best under A, B, C"))
-            axes.annotate(
-                winner.preference, place, (4, 4), textcoords="offset points", color=_ACCENT
-            )
+    winners = [winner for winner in view.winners if winner.preference != "job"]
+    scattered(winners, s=16, color=_ACCENT, label="best under A, B, C")
+    for winner in winners:
+        place = winner.objectives[horizontal], winner.objectives[vertical]
+        axes.annotate(winner.preference, place, (4, 4), textcoords="offset points", color=_ACCENT)
     for axis, scale in ((axes.xaxis, axes.set_xscale), (axes.yaxis, axes.set_yscale)):
         scale("log")
         axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0), numticks=5))
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_minor_formatter(NullFormatter())
-    axes.grid(visible=True, color="0.9", lw=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _once(axes: Axes, label: str) -> str:
-    """Return the label unless the legend has it."""
-    return "" if label in axes.get_legend_handles_labels()[1] else label
-
-
-def draw_robustness(views: Mapping[str, RobustnessView], *, title: str) -> Figure:
-    """Draw the index with its interval by scenario, designs side by side (after fig. 4.8).
-
-    views: of the same scenarios, by label.
-    """
-    from matplotlib.figure import Figure
-
-    scenarios = [*next(iter(views.values())).scenarios, "all"]
-    figure = Figure(figsize=(8.0, 3.8), layout="constrained")
-    axes = figure.add_subplot()
-    width = 0.8 / len(views)
-    for k, (name, view) in enumerate(views.items()):
-        places, indices = [], []
-        for n, scenario in enumerate(scenarios):
-            index = view.index if scenario == "all" else view.scenarios[scenario].index
-            # A missing index has no bar.
-            if index is not None:
-                places.append(n + (k - (len(views) - 1) / 2) * width)
-                indices.append(index)
-        errors = [[i.value - i.low for i in indices], [i.high - i.value for i in indices]]
-        axes.bar(
-            places,
-            [index.value for index in indices],
-            width,
-            yerr=errors,
-            error_kw={"elinewidth": 1.0, "capsize": 2.0},
-            label=name,
-        )
-    axes.set_xticks(range(len(scenarios)), scenarios, rotation=20, ha="right")
-    axes.set_ylabel("robustness index  [1]")
-    figure.suptitle(title, x=0.02, ha="left", weight="bold")
-    axes.grid(visible=True, axis="y", color="0.9", lw=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, ncols=len(views), loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    return figure
 
 
 def draw_parameters(view: IdentifiabilityView, truth: Mapping[str, float]) -> Figure:
     """Draw one panel per parameter: its interval against the threshold (fig. 2.14)."""
-    from matplotlib.figure import Figure
-
     columns = min(len(view.parameters), 6)
     rows = -(-len(view.parameters) // columns)
-    figure = Figure(figsize=(2.2 * columns, 1.6 * rows + 0.6), layout="constrained")
+    figure = _figure(2.2 * columns, 1.6 * rows + 0.6)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     across = [100.0 * threshold for threshold in view.thresholds]
     for axes, p in zip(panels, view.parameters, strict=False):
@@ -281,19 +296,18 @@ def draw_parameters(view: IdentifiabilityView, truth: Mapping[str, float]) -> Fi
             across,
             [interval.low for interval in p.intervals],
             [interval.high for interval in p.intervals],
-            color="#9db8d9",
+            color=_BAND,
             lw=0,
         )
         for choice, name in enumerate(c.name for c in p.choices):
             axes.text(100.0, choice, name, fontsize=5, va="center", ha="right")
-        axes.axhline(_height(p, p.best), color="#1f3a5f", lw=1.0)
+        axes.axhline(_height(p, p.best), color=_INK, lw=1.0)
         if p.name in truth:
-            axes.axhline(truth[p.name], color="#d1495b", lw=1.0, ls="--")
+            axes.axhline(truth[p.name], color=_ACCENT, lw=1.0, ls="--")
         axes.set_ylim(p.low, p.high)
         axes.set_xscale("log")
-        axes.set_title(f"{p.name} [{p.unit}]", fontsize=6, loc="left")
+        axes.set_title(f"{p.name} [{p.unit}]", fontsize=6, weight="normal")
         axes.tick_params(labelsize=6)
-        axes.spines[["top", "right"]].set_visible(False)
     for axes in panels[len(view.parameters) :]:
         axes.set_visible(False)
     figure.supxlabel("fitness above its run's best  [%]", fontsize=8)
@@ -306,3 +320,82 @@ def _height(p: ParameterView, value: float | str) -> float:
         return value
     names = [choice.name for choice in p.choices]
     return float(names.index(value)) if value in names else -1.0
+
+
+def draw_leg(pair: Synchronised, quantity: Quantity) -> Figure:
+    """Draw time series of the first leg's joints, measured and simulated."""
+    joints = pair.measured.joints[:JOINTS_PER_LEG]
+    figure = _figure(9.0, 6.5)
+    drawn = figure.subplots(len(joints), 1, sharex=True)
+    time = np.arange(len(pair.measured.time)) * CONTROL_PERIOD
+    for axes, joint in zip(drawn, joints, strict=True):
+        for log, colour, label in _both(pair):
+            axes.plot(time, columns_of(log, quantity, [joint]), color=colour, lw=1.0, label=label)
+        axes.set_ylabel(f"{joint}\n[{quantity.unit}]")
+    drawn[0].legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    drawn[0].set_title(f"{quantity}: {quantity.meaning}")
+    drawn[-1].set_xlabel("time since the first row compared  [s]")
+    drawn[-1].set_xlim(time[0], time[-1])
+    return figure
+
+
+def draw_spectra(pair: Synchronised, quantity: Quantity) -> Figure:
+    """Draw amplitude spectra by link, averaged over its joints, without the mean value."""
+    figure = _figure(9.0, 6.5)
+    drawn = figure.subplots(JOINTS_PER_LEG, 1, sharex=True)
+    for link, axes in enumerate(drawn, start=1):
+        joints = channels_of_link(pair.measured, quantity, link)
+        for log, colour, label in _both(pair):
+            columns = columns_of(log, quantity, joints)
+            frequency, amplitude = amplitude_spectrum(columns, CONTROL_PERIOD)
+            shown = (frequency > 0.0) & (frequency <= _HIGHEST)
+            height = amplitude[shown].mean(axis=1)
+            axes.plot(frequency[shown], height, color=colour, lw=1.2, label=label)
+        axes.set_ylabel(f"link {link}\n[{quantity.unit}]")
+        axes.set_ylim(bottom=0.0)
+    drawn[0].legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    drawn[0].set_title(f"Amplitude spectra of {quantity}")
+    drawn[-1].set_xlabel("frequency  [Hz]")
+    drawn[-1].set_xlim(0.0, _HIGHEST)
+    return figure
+
+
+def draw_errors(comparison: Comparison) -> Figure:
+    """Draw the RMAE of every quantity and link in the colours of the tolerance classes."""
+    from matplotlib.patches import Patch
+
+    rows = [
+        (f"{judged.quantity}  {agreement.name}", agreement)
+        for judged in comparison.quantities
+        for agreement in (judged.links or (judged.whole,))
+    ]
+    figure = _figure(9.0, 1.4 + 0.3 * len(rows))
+    axes = figure.add_subplot()
+    lengths = [min(agreement.rmae, _LARGEST) for _, agreement in rows]
+    colours = [_COLOURS[agreement.tolerance] for _, agreement in rows]
+    axes.barh(range(len(rows)), lengths, color=colours, height=0.7)
+    for row, (_, agreement) in enumerate(rows):
+        over = "> " if agreement.rmae > _LARGEST else ""
+        text = f" {over}{min(agreement.rmae, _LARGEST) * 100:.1f} %"
+        axes.text(lengths[row], row, text, va="center", size="small")
+    for tolerance in Tolerance:
+        if tolerance.limit <= _LARGEST:
+            axes.axvline(tolerance.limit, color="0.6", lw=0.8, ls=":")
+    axes.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, min(_LARGEST * 1.1, max(0.55, *(x + 0.08 for x in lengths))))
+    axes.xaxis.set_major_formatter(lambda x, _: f"{x * 100:.0f} %")
+    axes.set_xlabel("RMAE")
+    axes.set_title("RMAE by link")
+    axes.legend(
+        handles=[Patch(color=_COLOURS[t], label=t.value) for t in Tolerance],
+        ncols=len(Tolerance),
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+    )
+    return figure
+
+
+def _both(pair: Synchronised) -> tuple[tuple[MeasuredLog, str, str], ...]:
+    label = "measured (synthetic)" if pair.measured.synthetic else "measured"
+    return (pair.measured, _INK, label), (pair.simulated, _ACCENT, "simulated")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from gaitswarm.cli.output import Parts
+
 if TYPE_CHECKING:
     from gaitswarm.cli.rich_table import Table
     from gaitswarm.services.optimizer.analysis.evaluations import (
@@ -257,7 +259,7 @@ def search_line(best: BestView) -> Iterator[str]:
         )
 
 
-def job_parts(job: JobView) -> Iterator[Table | str]:
+def job_parts(job: JobView) -> Parts:
     """Yield a job's state, progress and best design."""
     rate, time_left = job.evaluations_per_second, None
     if not job.state.terminal:
@@ -291,7 +293,7 @@ def job_parts(job: JobView) -> Iterator[Table | str]:
         yield from best_parts(job.best, job)
 
 
-def best_parts(best: BestView, job: JobView) -> Iterator[Table | str]:
+def best_parts(best: BestView, job: JobView) -> Parts:
     """Yield a job's best design and its results."""
     yield design_table(job.spec, {"best": best.design})
     yield results_table({"best": best.scenarios}, job.objectives)

@@ -1,24 +1,27 @@
-"""`gaitswarm db`, `token` and `audit`: administration of an installation."""
+"""Administration of an installation: databases, tokens, audit log, plug-ins, benchmark."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
 from gaitswarm.cli.exit_codes import CheckFailed
-from gaitswarm.cli.inputs.options import Db, Json, completed
-from gaitswarm.cli.output import note, show
+from gaitswarm.cli.inputs.options import Db, Json, Precision, completed, one_of
+from gaitswarm.cli.output import Parts, Printed, note, show
+from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.output import Printed
-    from gaitswarm.services.optimizer.access import Token
     from gaitswarm.services.optimizer.store.tokens import Tokens
+    from gaitswarm.services.profile import JobProfile
+    from gaitswarm.views.catalogue import CaseView, OptimizerView
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing data.")]
 
@@ -161,11 +164,11 @@ def create(
     with _tokens(db) as tokens:
         token, secret = tokens.create(name, Scope(scope))
 
-    def parts() -> Iterator[str]:
+    def parts() -> Parts:
         note(f"token {name!r} of scope {scope}; the secret is shown only once:")
         yield secret
 
-    return {**_document(token), "secret": secret}, parts()
+    return {**asdict(token), "secret": secret}, parts()
 
 
 def list_tokens(db: Db = None) -> Printed:
@@ -173,7 +176,7 @@ def list_tokens(db: Db = None) -> Printed:
     with _tokens(db, create=False) as tokens:
         listed = tokens.all()
 
-    def parts() -> Iterator[str]:
+    def parts() -> Parts:
         if not listed:
             note("there are no tokens; create one by `gaitswarm token create NAME`")
         for token in listed:
@@ -181,7 +184,7 @@ def list_tokens(db: Db = None) -> Printed:
             created = f"{token.created_at:%Y-%m-%d}"
             yield f"{token.name:24} {token.scope:7} created {created}  {state}"
 
-    return [_document(token) for token in listed], parts()
+    return listed, parts()
 
 
 def revoke(name: Name, db: Db = None) -> Printed:
@@ -189,11 +192,11 @@ def revoke(name: Name, db: Db = None) -> Printed:
     with _tokens(db, create=False) as tokens:
         token = tokens.revoke(name)
 
-    def parts() -> Iterator[str]:
+    def parts() -> Parts:
         note(f"token {name!r} is revoked")
         yield from ()
 
-    return _document(token), parts()
+    return token, parts()
 
 
 @contextmanager
@@ -206,15 +209,6 @@ def _tokens(db: str | None, *, create: bool = True) -> Iterator[Tokens]:
     url = (database_to_write if create else database_to_read)(read_settings(db=db or None))
     with closing(open_store(url)) as store:
         yield store.tokens
-
-
-def _document(token: Token) -> dict[str, Any]:
-    return {
-        "name": token.name,
-        "scope": str(token.scope),
-        "created_at": token.created_at.isoformat(),
-        "revoked_at": None if token.revoked_at is None else token.revoked_at.isoformat(),
-    }
 
 
 def audit(
@@ -242,7 +236,7 @@ def audit(
     with closing(open_store(database_to_write(settings))) as store:
         entries = store.audit(job_id=job, limit=limit).items
 
-    def parts() -> Iterator[str]:
+    def parts() -> Parts:
         if not entries:
             note("no entries of this job" if job else "no entries yet")
         for entry in entries:
@@ -253,3 +247,121 @@ def audit(
             )
 
     return map(AuditEntryView.model_validate, entries), parts()
+
+
+def optimizers() -> Printed:
+    """List search methods and their settings."""
+    from gaitswarm.views.catalogue import optimizer_views
+
+    views = optimizer_views()
+    rows = (
+        (view.name, _described(view), _settings(view.settings.model_dump(exclude={"name"})))
+        for view in views
+    )
+    return iter(views), _listed(("name", "<description", "<settings"), rows)
+
+
+def plugins() -> Printed:
+    """List installed plug-ins: controllers, cases and search methods of other packages."""
+    from gaitswarm.views.catalogue import plugin_views
+
+    views = plugin_views()
+    rows = (
+        (
+            *(view.kind, view.name, view.distribution, view.version),
+            view.state if view.reason is None else f"{view.state}: {view.reason}",
+        )
+        for view in views
+    )
+    return iter(views), _listed(("kind", "<name", "<distribution", "<version", "<state"), rows)
+
+
+def cases() -> Printed:
+    """List cases: plug-ins that evaluate designs instead of the simulator, and their settings."""
+    from gaitswarm.views.catalogue import case_views
+
+    views = case_views()
+    rows = []
+    for view in views:
+        fields = view.settings_schema.get("properties", {}).items()
+        lines = (f"{name} {f.get('default', '')}" for name, f in fields if name != "name")
+        rows.append((view.name, _described(view), "\n".join(lines)))
+    return iter(views), _listed(("name", "<description", "<settings"), rows)
+
+
+def _listed(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> Parts:
+    yield table(headings, rows)
+
+
+def _described(view: OptimizerView | CaseView) -> str:
+    return f"{view.description}{'' if view.needs is None else f'; needs {view.needs}'}"
+
+
+def _settings(settings: dict[str, Any]) -> str:
+    return "\n".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
+
+
+_SHARES: Final = {
+    "physics": "kernel: physics steps",
+    "control": "kernel: control ticks",
+    "tables": "tasks: fuzzy tables",
+    "preparation": "tasks: desired angles, parameters, objectives",
+    "workers": "transfer of tasks and results, waiting for the last worker",
+    "search": "judging designs and asking for the next",
+    "store": "store",
+}
+
+
+def bench(
+    repeats: Annotated[
+        int, typer.Option(min=1, max=1000, help="Passes; the fastest one counts.")
+    ] = 3,
+    backend: Annotated[
+        str, typer.Option(help="auto, native (compiled) or reference (interpreted).")
+    ] = "auto",
+    precision: Precision = None,
+    profile: Annotated[
+        bool,
+        typer.Option("--profile", help="Profile a complete job of chapter 4 on all cores."),
+    ] = False,
+    evaluator: Annotated[
+        str, typer.Option(help="Workers of the profiled job: ray or in-process.")
+    ] = "ray",
+) -> Printed:
+    """Measure the simulator's speed on one core, for the main Fuzzy-PI job."""
+    from typing import get_args
+
+    from gaitswarm.services.worker import EvaluatorKind
+    from gaitswarm.sim import benchmark
+    from gaitswarm.sim.assembly import Backend
+    from gaitswarm.sim.kernel import walk
+
+    digits: walk.Precision = one_of(get_args(walk.Precision), precision or "double", "precision")
+    if profile:
+        from gaitswarm.services.profile import profile_job
+
+        kind: EvaluatorKind = one_of(get_args(EvaluatorKind), evaluator, "evaluator")
+        measured = profile_job(evaluator=kind, precision=digits)
+        return measured, _profile_text(measured)
+    requested: Backend = one_of(get_args(Backend), backend, "backend")
+    result = benchmark.measure(repeats=repeats, backend=requested, precision=digits)
+    size = (
+        "" if result.bytes_of_code is None else f", {result.bytes_of_code / 1024:.0f} KiB of code"
+    )
+    return result, (
+        f"{result.backend} kernel in {result.precision} precision, {result.lanes} walkers in"
+        f" lock-step{size}: {result.us_per_step_per_walker:.3f} us per physics step and walker,"
+        f" {result.real_time_factor_per_core:.0f} x real time on one core,"
+        f" {result.lane_use:.1%} of its lanes used"
+    )
+
+
+def _profile_text(profile: JobProfile) -> str:
+    heading = (
+        f"{profile.walks} simulations of a chapter-4 job, {profile.slots} slots"
+        f" ({profile.evaluator}), {profile.precision} precision: {profile.seconds:.2f} s,"
+        f" {profile.walks_per_second:.0f} simulations/s, {profile.lane_use:.1%} of the kernel's"
+        " lanes used"
+    )
+    lines = [f"  {name:12} {share:6.1%}  {_SHARES[name]}" for name, share in profile.shares.items()]
+    return "\n".join([heading, "shares of the slots' time:", *lines])

@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from gaitswarm.cli.commands.robustness import Radius, Samples, Seed, shown_progress
+from gaitswarm.cli.commands.designs import Radius, Samples, Seed, shown_progress
 from gaitswarm.cli.files import replacing
 from gaitswarm.cli.inputs.options import JobId, Json, Place, Precision
-from gaitswarm.cli.output import note, show
+from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.output import Printed
-    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.services.optimizer.analysis.failures import FailuresView
     from gaitswarm.services.optimizer.analysis.front import (
@@ -68,7 +66,7 @@ def rank(
     return ranking, _ranking(ranking)
 
 
-def _ranking(ranking: RankingView) -> Iterator[Table | str]:
+def _ranking(ranking: RankingView) -> Parts:
     """Yield the best designs by another preference, with their ranks before."""
     columns = [">rank", "before", "design", "fitness", "before"]
     maximized = any(design.figure_of_merit is not None for design in ranking.top)
@@ -124,7 +122,7 @@ def front(
     show(view, _front(view, placed), as_json=as_json)
 
 
-def _front(view: FrontView, published: Mapping[str, Placed]) -> Iterator[Table | str]:
+def _front(view: FrontView, published: Mapping[str, Placed]) -> Parts:
     """Yield knees, the best in each objective, winners of preferences, and published designs."""
     heads = [f"{SHORT[o.name]}\n{o.unit}" for o in view.objectives]
     rows = (
@@ -259,7 +257,7 @@ def importance(job_id: JobId, *, jobs: Jobs) -> Printed:
     return view, _importance(view)
 
 
-def _importance(view: ImportanceView) -> Iterator[Table | str]:
+def _importance(view: ImportanceView) -> Parts:
     def share(index: IndexIntervalView | None) -> str:
         return MISSING if index is None else f"{100.0 * index.value:.0f}"
 
@@ -320,7 +318,7 @@ def failures(job_id: JobId, *, jobs: Jobs) -> Printed:
     return view, _failures(view)
 
 
-def _failures(view: FailuresView) -> Iterator[Table | str]:
+def _failures(view: FailuresView) -> Parts:
     """Yield statuses by case, most failures first, and the share of failed designs."""
     rows = (
         (
@@ -354,7 +352,7 @@ def scenarios(
     return view, _families(view)
 
 
-def _families(view: ScenarioFamiliesView) -> Iterator[Table | str]:
+def _families(view: ScenarioFamiliesView) -> Parts:
     def share(value: float | None) -> str:
         return "fails" if value is None else f"{100.0 * value:.1f}"
 
@@ -435,7 +433,7 @@ def preferences(
     return view, _preferences(view)
 
 
-def _preferences(view: RobustPreferencesView) -> Iterator[Table | str]:
+def _preferences(view: RobustPreferencesView) -> Parts:
     rows = (
         (
             place(candidate),
@@ -456,7 +454,7 @@ def _preferences(view: RobustPreferencesView) -> Iterator[Table | str]:
     )
 
 
-def _fits(view: PreferenceForView) -> Iterator[Table | str]:
+def _fits(view: PreferenceForView) -> Parts:
     """Yield preferences that suit a design, one per set of biases, best first."""
     rows = (
         (

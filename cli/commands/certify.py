@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 
 import typer
 
-from gaitswarm.cli.commands.simulate import without_logs
+from gaitswarm.cli.commands.designs import without_logs
 from gaitswarm.cli.inputs.options import (
     ControllerOption,
     JobName,
@@ -22,12 +22,11 @@ from gaitswarm.cli.inputs.options import (
     full_id,
     name_and_value,
 )
-from gaitswarm.cli.output import note
+from gaitswarm.cli.output import Parts, Printed, note
 from gaitswarm.cli.tables import MISSING, SHORT, Bold, number, results_table, table, worth
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
     from gaitswarm.services.optimizer.analysis.certificate import (
         CertificateView,
@@ -286,7 +285,7 @@ _COMPARED: Final = ("torque", "acceleration", "angular_acceleration", "energy", 
 """Objectives shown; the loss of height, a difference near zero, is only in the JSON."""
 
 
-def _parts(view: CertificateView, place: str) -> Iterator[Table | str]:
+def _parts(view: CertificateView, place: str) -> Parts:
     """Yield the results of a certificate."""
     yield _by_scenario(view)
     yield (
@@ -374,9 +373,7 @@ def _engine_table(name: str, engine: ComparedEngineView) -> Table:
     return table(heads, rows, title=f"The nominal world in {name}: {engine.description}", gap=1)
 
 
-def _replayed(
-    spec: CertificateSpec, world: int, log: Path | None
-) -> tuple[dict[str, Any], Iterator[Table | str]]:
+def _replayed(spec: CertificateSpec, world: int, log: Path | None) -> tuple[dict[str, Any], Parts]:
     """Simulate a certificate's design in one world."""
     from gaitswarm.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
@@ -393,7 +390,7 @@ def _replayed(
     )
     view = run_simulation(request)
 
-    def parts() -> Iterator[Table | str]:
+    def parts() -> Parts:
         columns = spec.design_space().columns
         rows = ((v.name, number(request.world[v.name]), v.unit) for v in columns)
         yield table(("perturbation", "value", "<unit"), rows, title="The world")

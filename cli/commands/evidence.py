@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -12,13 +11,12 @@ import typer
 from gaitswarm.cli.exit_codes import CheckFailed
 from gaitswarm.cli.files import replacing
 from gaitswarm.cli.inputs.options import JobId, Json, Place, full_id
-from gaitswarm.cli.output import note, show
+from gaitswarm.cli.output import Parts, note, show
 from gaitswarm.cli.tables import number, table
 from gaitswarm.cli.tables import place as place_of
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.tables import TableFormat
     from gaitswarm.views.verification import HistoryVerificationView, VerificationView
@@ -131,7 +129,7 @@ def _verify_evidence(
 
 def _verification(
     view: VerificationView | HistoryVerificationView,
-) -> Iterator[Table | str]:
+) -> Parts:
     states = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not checked", "yellow")}
 
     def whose(certificate: str | None, end: str) -> str:

@@ -23,12 +23,10 @@ from gaitswarm.cli.inputs.options import (
     completed,
     one_of,
 )
-from gaitswarm.cli.output import note, print_text, write_json_items
+from gaitswarm.cli.output import Parts, Printed, note, print_text, write_json_items
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.output import Printed
-    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.specs import ForkOptions
@@ -132,7 +130,7 @@ def list_jobs(
             limit=most,
         )
 
-    def parts() -> Iterator[Table]:
+    def parts() -> Parts:
         from gaitswarm.cli.tables import jobs_table
 
         rows = list(matches(limit + 1))
@@ -247,7 +245,7 @@ def best(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Show a job's best design so far, by scenario."""
     view = jobs.best(job_id)
 
-    def parts() -> Iterator[Table | str]:
+    def parts() -> Parts:
         from gaitswarm.cli.tables import best_parts, place, worth
 
         job = jobs.job(job_id)
@@ -266,7 +264,7 @@ def diff(job_ids: JobIds, *, jobs: Jobs) -> Printed:
     return view, _comparison(view)
 
 
-def _comparison(view: JobComparisonView) -> Iterator[Table | str]:
+def _comparison(view: JobComparisonView) -> Parts:
     from gaitswarm.cli.tables import MISSING, number, table
 
     rows = [

@@ -1,12 +1,10 @@
-"""`gaitswarm optimize`, and lists of search methods, plug-ins and cases."""
+"""`gaitswarm optimize`: a job in this process."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -18,13 +16,7 @@ from gaitswarm.cli.inputs.options import (
     completed,
 )
 from gaitswarm.cli.output import note
-from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest
-
-if TYPE_CHECKING:
-    from gaitswarm.cli.output import Printed
-    from gaitswarm.cli.rich_table import Table
-    from gaitswarm.views.catalogue import CaseView, OptimizerView
 
 
 def optimize(
@@ -95,55 +87,3 @@ def optimize(
             other = job_run(by_other_optimizer(job.spec, compare_optimizer), store, jobs, embedded)
             others[compare_optimizer] = jobs.job(other.id)
         finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, others=others)
-
-
-def optimizers() -> Printed:
-    """List search methods and their settings."""
-    from gaitswarm.views.catalogue import optimizer_views
-
-    views = optimizer_views()
-    rows = (
-        (view.name, _described(view), _settings(view.settings.model_dump(exclude={"name"})))
-        for view in views
-    )
-    return iter(views), _listed(("name", "<description", "<settings"), rows)
-
-
-def plugins() -> Printed:
-    """List installed plug-ins: controllers, cases and search methods of other packages."""
-    from gaitswarm.views.catalogue import plugin_views
-
-    views = plugin_views()
-    rows = (
-        (
-            *(view.kind, view.name, view.distribution, view.version),
-            view.state if view.reason is None else f"{view.state}: {view.reason}",
-        )
-        for view in views
-    )
-    return iter(views), _listed(("kind", "<name", "<distribution", "<version", "<state"), rows)
-
-
-def cases() -> Printed:
-    """List cases: plug-ins that evaluate designs instead of the simulator, and their settings."""
-    from gaitswarm.views.catalogue import case_views
-
-    views = case_views()
-    rows = []
-    for view in views:
-        fields = view.settings_schema.get("properties", {}).items()
-        lines = (f"{name} {f.get('default', '')}" for name, f in fields if name != "name")
-        rows.append((view.name, _described(view), "\n".join(lines)))
-    return iter(views), _listed(("name", "<description", "<settings"), rows)
-
-
-def _listed(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[Table]:
-    yield table(headings, rows)
-
-
-def _described(view: OptimizerView | CaseView) -> str:
-    return f"{view.description}{'' if view.needs is None else f'; needs {view.needs}'}"
-
-
-def _settings(settings: dict[str, Any]) -> str:
-    return "\n".join(f"{name} {json.dumps(value)}" for name, value in settings.items())

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gaitswarm.cli.commands.robustness import SampleOptions, estimate
+from gaitswarm.cli.commands.designs import SampleOptions, estimate
 from gaitswarm.cli.inputs.options import JobId, Place
-from gaitswarm.cli.output import note
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.robustness_index import RobustnessRequest
 
@@ -25,18 +22,19 @@ Output = Annotated[
 
 def convergence(job_id: JobId, output: Output, *, jobs: Jobs) -> None:
     """Draw a job's fitness over its iterations."""
+    from gaitswarm.cli.pictures import save
     from gaitswarm.evidence.page import draw_convergence
 
     job, iterations = jobs.job(job_id), list(jobs.iterations(job_id))
-    _save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)
+    save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)
 
 
 def front(job_id: JobId, output: Output, *, jobs: Jobs) -> None:
     """Draw the Pareto front of a job in every pair of objectives, with its knees and winners."""
-    from gaitswarm.cli.pictures import draw_front
+    from gaitswarm.cli.pictures import draw_front, save
 
     job, view = jobs.job(job_id), jobs.front(job_id, most=10_000)
-    _save(draw_front(view, title=f"Pareto front of {job.name or f'job {job.id}'}"), output)
+    save(draw_front(view, title=f"Pareto front of {job.name or f'job {job.id}'}"), output)
 
 
 def surface(
@@ -53,14 +51,14 @@ def surface(
 ) -> None:
     """Draw the quantised output of a Fuzzy-PI design over angle error and motor current."""
     from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.pictures import draw_surface
+    from gaitswarm.cli.pictures import draw_surface, save
     from gaitswarm.sim.controllers import CONTROLLERS
     from gaitswarm.sim.controllers.surface import surface as surface_of
 
     given = given_design(design, "fuzzy-pi", place=place)
     (inference,) = CONTROLLERS["fuzzy-pi"].inferences(given.values)
     drawn = surface_of(inference, error_points=129, current_points=65)
-    _save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
+    save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
 
 
 def robustness(
@@ -75,7 +73,7 @@ def robustness(
 ) -> None:
     """Draw robustness indices of designs by scenario, with their intervals."""
     from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.pictures import draw_robustness
+    from gaitswarm.cli.pictures import draw_robustness, save
 
     requests: dict[str, RobustnessRequest] = {}
     for design in designs:
@@ -87,11 +85,4 @@ def robustness(
             "the designs' jobs have different scenarios; pass --scenarios", field="scenarios"
         )
     views = {label: estimate(request) for label, request in requests.items()}
-    _save(draw_robustness(views, title=title), output)
-
-
-def _save(figure: Figure, output: Path) -> None:
-    from gaitswarm.cli.pictures import save
-
-    save(figure, output)
-    note(f"picture written to {output}")
+    save(draw_robustness(views, title=title), output)

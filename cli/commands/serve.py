@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import gc
+import json
 import logging
 import os
+import sys
 import threading
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
@@ -27,6 +30,44 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.run.runner import Runner
     from gaitswarm.services.runtime import Runtime
     from gaitswarm.settings import Settings
+
+LogFormat = Literal["console", "json"]
+
+
+class JsonFormatter(logging.Formatter):
+    """One line of JSON per message: time, level, logger, message.
+
+    If they apply, also `job`, `iteration`, `request` and `traceback`.
+    """
+
+    def format(self, record: logging.LogRecord) -> str:
+        from gaitswarm.services.optimizer.log_context import log_fields
+
+        document: dict[str, Any] = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **log_fields(),
+        }
+        if record.exc_info:
+            document["traceback"] = self.formatException(record.exc_info)
+        return json.dumps(document, ensure_ascii=False, default=str)
+
+
+def log_to_stderr(level: str, log_format: LogFormat = "console") -> None:
+    handler = logging.StreamHandler(sys.stderr)
+    if log_format == "json":
+        handler.setFormatter(JsonFormatter())
+        logging.captureWarnings(capture=True)
+    else:
+        handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    logging.basicConfig(level=level, handlers=[handler])
+    # It would report migrations at every start.
+    logging.getLogger("alembic").setLevel(logging.WARNING)
+    # It logs complete URLs of webhooks, which may contain secrets.
+    logging.getLogger("httpx2").setLevel(logging.WARNING)
+
 
 _SIGNAL_POLL: Final = 0.2
 """Maximum delay before a signal is handled [s]."""
@@ -65,7 +106,7 @@ def serve(
     from gaitswarm.api.app import create_app
     from gaitswarm.api.page import is_built
     from gaitswarm.api.server import ApiServer
-    from gaitswarm.cli.logs import log_to_stderr
+    from gaitswarm.cli.commands.serve import log_to_stderr
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
@@ -112,7 +153,7 @@ def runner(options: RunnerOptions) -> None:
     Running jobs then commit their current iterations and return to the queue; a second signal
     discards these iterations.
     """
-    from gaitswarm.cli.logs import log_to_stderr
+    from gaitswarm.cli.commands.serve import log_to_stderr
     from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
     from gaitswarm.services.runtime import stop_on_signals
     from gaitswarm.settings import read_settings

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, cast, get_type
 
 import typer
 
-from gaitswarm.cli.output import show
+from gaitswarm.cli.output import Printed, show
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 
 if TYPE_CHECKING:
@@ -359,9 +359,8 @@ def expanded(command: Callable[..., Any]) -> Callable[..., None]:
     options of `Place`, which is open until the result is printed. A command that returns `Printed`
     gets --json.
     """
-    names = {"Jobs": Place, "Printed": tuple}
-    annotations = get_type_hints(command, None, names, include_extras=True)
-    prints = annotations.pop("return") is tuple
+    annotations = get_type_hints(command, None, {"Jobs": Place}, include_extras=True)
+    prints = annotations.pop("return") == Printed
     groups = {name: kind for name, kind in annotations.items() if is_dataclass(kind)}
     parameters: list[inspect.Parameter] = []
     for name, parameter in inspect.signature(command).parameters.items():

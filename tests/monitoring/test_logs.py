@@ -18,7 +18,7 @@ import pytest
 from starlette.requests import Request
 from starlette.responses import StreamingResponse
 
-from gaitswarm.cli.logs import JsonFormatter
+from gaitswarm.cli.commands.serve import JsonFormatter
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.log_context import log_context, log_fields
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
@@ -90,7 +90,7 @@ def test_in_json_every_line_is_an_object_with_its_context(database: Path) -> Non
         assert "traceback" not in entry
     (ended,) = [e for e in entries if "succeeded after 2 iterations" in e["message"]]
     assert ended["job"] in ended["message"] and ended["level"] == "info"
-    away = [e for e in entries if e["message"].startswith("GET /v1/jobs: ")]
+    away = [e for e in entries if e["message"].startswith("GET '/v1/jobs': ")]
     assert away and {e["request"] for e in away} == {"my-request.1"}
     assert {e["level"] for e in away} == {"error"}
     assert "Traceback" not in "".join(lines)
@@ -102,7 +102,7 @@ def test_on_the_console_an_outage_is_a_line_and_no_traceback(database: Path) -> 
         lose_the_database(database, client)
 
     lines = logged(database, visit)
-    assert any(" ERROR GET /v1/jobs: database " in line for line in lines), lines
+    assert any(" ERROR GET '/v1/jobs': database " in line for line in lines), lines
     assert "Traceback" not in "".join(lines)
 
 

@@ -1,0 +1,452 @@
+"""Commands about single designs: simulate, compare, robustness, firmware."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gaitswarm.cli.inputs.options import (
+    ControllerOption,
+    Place,
+    Precision,
+    PreferenceOption,
+    RobotOption,
+    TrajectoryOption,
+)
+from gaitswarm.cli.output import Parts, Printed, note
+from gaitswarm.cli.tables import (
+    SHORT,
+    Bold,
+    gait_in_words,
+    interval,
+    number,
+    results_table,
+    table,
+    worth,
+)
+from gaitswarm.services.optimizer.errors import InvalidRequest
+
+if TYPE_CHECKING:
+    from gaitswarm.cli.inputs.design_file import GivenDesign
+    from gaitswarm.firmware import FirmwareView
+    from gaitswarm.robustness_index import Progress, RobustnessRequest, RobustnessView
+    from gaitswarm.sim.drives import NamedDrive, WalkFigures
+    from gaitswarm.simulation import SimulationView
+
+
+def simulate(
+    design: Annotated[
+        str,
+        typer.Option(
+            metavar="JSON|FILE|published:NAME|job:ID",
+            help="JSON object {variable: value} of controller variables and optional gait"
+            " parameters, or with one under `design`; a published design, as published:A; or the"
+            " best of a job.",
+        ),
+    ],
+    controller: ControllerOption = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all; of the robot's folder"
+            " if it has scenarios, else of table 4.2 [default: the job's, else all]."
+        ),
+    ] = None,
+    trajectory: TrajectoryOption = None,
+    preference: PreferenceOption = None,
+    world: Annotated[
+        str | None,
+        typer.Option(
+            metavar="JSON|FILE",
+            help="Perturbations of the model, such as"
+            ' \'{"friction_factor": 0.7, "slope_added": 2}\', or an object with them under'
+            " `values`, as printed by `certify --json`.",
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.npz", help="Write 500 Hz logs as NumPy arrays."),
+    ] = None,
+    robot: RobotOption = None,
+    precision: Precision = None,
+    *,
+    place: Place,
+) -> Printed:
+    """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
+    from pydantic import ValidationError
+
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
+    from gaitswarm.cli.inputs.spec_file import json_object
+    from gaitswarm.designs import SimulationRequest
+    from gaitswarm.errors import invalid_request
+    from gaitswarm.simulation import run_simulation
+
+    given = given_design(design, controller, trajectory, robot=robot, place=place)
+    data: dict[str, Any] = {
+        "robot": given.robot(robot),
+        "controller": given.controller,
+        "design": given.values,
+        "scenarios": scenario_data(scenario or "all", robot),
+        "preference": preference or robot_defaults(robot).preference,
+        "precision": precision or "double",
+        "log": log is not None,
+    }
+    if given.spec is not None and scenario is None:
+        data["scenarios"] = given.spec.resolved_scenarios()
+    if given.spec is not None and preference is None:
+        data["preference"] = given.spec.preference
+    if world is not None:
+        document = json_object(world, "world")
+        data["world"] = document.get("values", document)
+    try:
+        request = SimulationRequest.model_validate(data)
+    except ValidationError as error:
+        raise invalid_request(error) from error
+    view = run_simulation(request)
+    return without_logs(view, log), _simulated(view)
+
+
+def without_logs(view: SimulationView, path: Path | None) -> dict[str, Any]:
+    """Write the logs of a simulation if there is a path; return the rest as JSON."""
+    if path is not None:
+        from gaitswarm.cli.files import write_walk_logs
+
+        write_walk_logs(path, {name: result.log for name, result in view.scenarios.items()})
+        note(f"log written to {path}")
+    return view.model_dump(mode="json", exclude={"scenarios": {"__all__": {"log"}}})
+
+
+def _simulated(view: SimulationView) -> Parts:
+    from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES
+
+    yield results_table({"": view.scenarios}, OBJECTIVES)
+    heads = [f"{m.name.replace('_', ' ')}\n{m.unit}" for m in MEASUREMENTS]
+    measured = (
+        (name, *(number(getattr(result.measurements, m.name)) for m in MEASUREMENTS))
+        for name, result in view.scenarios.items()
+    )
+    yield table(["scenario", *heads], measured, title="Measured", gap=1)
+    yield f"fitness {worth(view)}, in {view.precision} precision"
+    for name, result in view.scenarios.items():
+        if result.gait is not None:
+            yield f"{name}: {gait_in_words(result.gait)}"
+        if result.status != "ok":
+            yield f"{name}: {result.explanation}"
+
+
+def compare(
+    drives: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="DRIVE",
+            help="2011, 2016, pi, fuzzy-pi-3, job:ID for a job's best, or CONTROLLER:FILE for a"
+            " design file. Default: the first four.",
+        ),
+    ] = None,
+    scenario: Annotated[
+        str, typer.Option(help="Names or numbers, separated by commas, or all.")
+    ] = "all",
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw speed, power and effectivity.")
+    ] = None,
+    robot: RobotOption = None,
+    *,
+    place: Place,
+) -> Printed:
+    """Compare drives in the same scenarios: speed, power, effectivity, objectives."""
+    from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios
+    from gaitswarm.sim.drives import DRIVES
+    from gaitswarm.sim.drives import compare as compare_drives
+
+    compared = [_drive(name, place) for name in drives or DRIVES]
+    walked = chosen_scenarios(scenario, robot)
+    figures = compare_drives(compared, walked, robot=chosen_robot(robot))
+    if plot is not None:
+        from gaitswarm.cli.pictures import draw_comparison, save
+
+        save(draw_comparison(figures), plot)
+    return [_figures(f) for f in figures], _compared(compared, figures)
+
+
+def _drive(name: str, place: Place) -> NamedDrive:
+    from gaitswarm.cli.inputs.design_file import given_design, read_design
+    from gaitswarm.sim.controllers import CONTROLLERS
+    from gaitswarm.sim.drives import drive_of_design, find_drive
+
+    kind, colon, what = name.partition(":")
+    if not colon:
+        return find_drive(name)
+    if kind == "job":
+        best = given_design(name, None, place=place)
+        return drive_of_design(name, best.controller, best.values)
+    for controller in CONTROLLERS:
+        if kind == controller:
+            return drive_of_design(name, controller, read_design(what, controller))
+    raise InvalidRequest(
+        f"{kind!r} is neither `job` nor a controller ({', '.join(CONTROLLERS)})", field="drive"
+    )
+
+
+def _figures(figures: WalkFigures) -> dict[str, object]:
+    return {
+        "drive": figures.drive,
+        "scenario": figures.scenario,
+        "status": figures.status.label,
+        "speed": figures.speed,
+        "power": figures.power,
+        "effectivity": figures.effectivity,
+        "objectives": dict(figures.objectives),
+    }
+
+
+def _compared(drives: list[NamedDrive], figures: tuple[WalkFigures, ...]) -> Parts:
+    named = ("torque", "acceleration", "angular_acceleration", "energy")
+    rows: list[list[Any]] = []
+    scenario = ""
+    for f in figures:
+        if f.scenario != scenario:
+            scenario = f.scenario
+            rows.append(Bold([scenario]))
+        values = (f.speed, f.power, f.effectivity, *(f.objectives[name] for name in named))
+        rows.append([f"  {f.drive}", f.status.label, *map(number, values)])
+    heads = ("speed m/s", "power W", "effect. m/J", "torque N m", "accel. m/s2", "ang.acc. rad/s2")
+    broken = (head.replace(" ", "\n", 1) for head in (*heads, "energy J/m"))
+    yield table(["scenario\ndrive", "<status", *broken], rows)
+    for drive in drives:
+        yield f"{drive.name}: {drive.description}"
+
+
+Samples = Annotated[int, typer.Option(help="Designs to sample around each given one.")]
+Radius = Annotated[
+    float, typer.Option(help="Radius of the sample, as a share of each variable's bounds.")
+]
+Seed = Annotated[int, typer.Option(help="Seed of the sample.")]
+
+
+@dataclass(frozen=True, slots=True)
+class SampleOptions:
+    """Options of a sample around designs."""
+
+    samples: Samples = 256
+    radius: Radius = 0.02
+    seed: Seed = 1
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all.",
+            show_default="those of the job, else all of the robot",
+        ),
+    ] = None
+    controller: ControllerOption = None
+    robot: RobotOption = None
+    precision: Precision = None
+
+    def request(self, given: GivenDesign) -> RobustnessRequest:
+        """Return the request for a design; a job's best uses the job's scenarios and robot."""
+        from pydantic import ValidationError
+
+        from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
+        from gaitswarm.errors import invalid_request
+        from gaitswarm.robustness_index import RobustnessRequest
+
+        scenarios: Any = scenario_data(self.scenarios or "all", self.robot)
+        if given.spec is None:
+            controlled = robot_defaults(self.robot).of_controller(given.controller)
+            variables = controlled.get("variables")
+        else:
+            variables = given.spec.design_space().variables
+            if self.scenarios is None:
+                scenarios = given.spec.resolved_scenarios()
+        data: dict[str, Any] = {
+            "controller": given.controller,
+            "design": given.values,
+            "samples": self.samples,
+            "radius": self.radius,
+            "seed": self.seed,
+            "precision": self.precision or "double",
+            "scenarios": scenarios,
+            "robot": given.robot(self.robot),
+            "variables": variables,
+        }
+        try:
+            return RobustnessRequest.model_validate(data)
+        except ValidationError as error:
+            raise invalid_request(error) from error
+
+
+def robustness(
+    design: Annotated[
+        str,
+        typer.Argument(
+            metavar="DESIGN|ID",
+            help="Design file, `-`, or published:NAME, as for `simulate`; or a job's id for its"
+            " best.",
+        ),
+    ],
+    options: SampleOptions,
+    *,
+    place: Place,
+) -> Printed:
+    """Estimate the robustness index of a design (thesis 4.4.3); smaller is more robust.
+
+    It is the norm of the Jacobian of the objectives' logarithms with respect to the variables as
+    shares of their bounds, from a regression over designs sampled around the given one.
+    """
+    from gaitswarm.cli.inputs.design_file import given_design
+
+    given = given_design(design, options.controller, robot=options.robot, place=place)
+    view = estimate(options.request(given))
+    return view, _robustness(view)
+
+
+def _robustness(view: RobustnessView) -> Parts:
+    def cells(name: str, part: Any, failed: int) -> list[Any]:
+        shares = [number(value, 3) for value in part.by_objective.values()]
+        return [name, *interval(part.index), *shares, failed]
+
+    rows = [cells(name, part, part.failed) for name, part in view.scenarios.items()]
+    rows.append(Bold(cells("all", view, sum(part.failed for part in view.scenarios.values()))))
+    heads = ["scenario", "index", "95 %", *(SHORT[o.name] for o in view.objectives), "failed"]
+    yield table(heads, rows, title="Robustness index", gap=1)
+    parts: list[Any] = [view, *view.scenarios.values()]
+    by_variable = (
+        (
+            variable.name,
+            f"{number(variable.least)} – {number(variable.most)}",
+            *(number(part.by_variable[variable.name], 3) for part in parts),
+        )
+        for variable in sorted(
+            view.variables, key=lambda v: view.by_variable[v.name] or 0.0, reverse=True
+        )
+    )
+    heads = ["sampled", "all", *(name.replace("-", "-\n") for name in view.scenarios)]
+    yield table(["variable", *heads], by_variable, title="By variable", gap=1)
+    yield (
+        f"{view.samples} designs within {100.0 * view.radius:g} % of each variable's bounds;"
+        " values are relative changes of objectives over the whole bounds; smaller is more robust"
+    )
+    largest = {
+        o.name: max(part.unexplained[o.name] or 0.0 for part in view.scenarios.values())
+        for o in view.objectives
+    }
+    shares = (f"{SHORT[name]} {number(100.0 * value, 2)} %" for name, value in largest.items())
+    yield f"unexplained by the linear model, largest of all scenarios: {', '.join(shares)}"
+    if view.held:
+        yield f"fixed: {', '.join(view.held)}"
+
+
+def estimate(request: RobustnessRequest) -> RobustnessView:
+    """Estimate the index, with progress on stderr."""
+    from gaitswarm.robustness_index import run_robustness
+
+    with shown_progress() as progress:
+        return run_robustness(request, progress=progress)
+
+
+@contextmanager
+def shown_progress() -> Iterator[Progress]:
+    """Print progress to stderr every two seconds."""
+    last = time.monotonic()
+
+    def progress(done: int, planned: int) -> None:
+        nonlocal last
+        if done < planned and time.monotonic() - last >= 2.0:
+            last = time.monotonic()
+            note(f"{done} of {planned} simulations")
+
+    yield progress
+
+
+def firmware(
+    design: Annotated[
+        str,
+        typer.Argument(
+            metavar="DESIGN|ID",
+            help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FOLDER", help="New folder."),
+    ],
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
+            " else all]."
+        ),
+    ] = None,
+    controller: ControllerOption = None,
+    robot: RobotOption = None,
+    table_bits: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ERRORxCURRENT",
+            help="Bits of a fuzzy table's indices, also for the simulations [default: 10x6].",
+        ),
+    ] = None,
+    *,
+    place: Place,
+) -> Printed:
+    """Write a design as C for the robot's microcontrollers, with a test against simulations."""
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.firmware import write_firmware
+
+    given = given_design(design, controller, robot=robot, place=place)
+    if given.spec is None or scenarios is not None:
+        walks = chosen_scenarios(scenarios or "all", robot)
+    else:
+        walks = given.spec.resolved_scenarios()
+    view = write_firmware(
+        given.values,
+        output,
+        scenarios=walks,
+        controller=given.controller,
+        robot=given.robot(robot),
+        label=given.label,
+        table_bits=None if table_bits is None else _bits(table_bits),
+    )
+    return view, _firmware(view)
+
+
+def _bits(text: str) -> tuple[int, int]:
+    from gaitswarm.errors import simulation_errors
+    from gaitswarm.sim.firmware import parsed_table_bits
+
+    with simulation_errors("table_bits"):
+        return parsed_table_bits(text)
+
+
+def _firmware(view: FirmwareView) -> Parts:
+    heads = ("walk", "samples", "rows at 500 Hz", "columns", "B", "B of a leg")
+    rows = (
+        (
+            *(walk.scenario, walk.status, walk.samples, gait.rows, gait.columns),
+            *(gait.bytes, gait.bytes_of_a_leg),
+        )
+        for walk, gait in zip(view.walks, view.trajectories, strict=True)
+    )
+    yield table(["scenario", *heads], rows)
+    memory = view.memory
+    yield (
+        f"tables: {memory.tables} B of the {memory.flash} B of flash of an {memory.processor};"
+        f" state between ticks: {memory.remembered} B of {memory.ram} B of RAM"
+    )
+    if view.table_difference is not None:
+        differences = ", ".join(
+            f"{name.replace('_', ' ')} {'unknown' if share is None else f'{share:.2%}'}"
+            for name, share in view.table_difference.items()
+        )
+        yield f"largest differences from 10 x 6 bits: {differences}"
+    for remark in memory.remarks:
+        yield f"does not fit: {remark}"
+    note(f"{len(view.files)} files written; to compare {view.samples} samples, run")
+    note(f"  make -C {view.folder} test")

@@ -15,7 +15,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page manual wheel research bench test test-all test-firefox unit lint lint-code lint-page format pictures lock clean setup setup-dev setup-manual page-if-possible
+.PHONY: help demo serve page manual wheel research bench test test-all test-research test-firefox unit lint lint-code lint-page format pictures lock clean setup setup-dev setup-manual page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -47,7 +47,7 @@ bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)
 
 # Tests start hundreds of processes; compiling every module again would take a third of their time.
-test test-all unit: export PYTHONDONTWRITEBYTECODE =
+test test-all test-research unit: export PYTHONDONTWRITEBYTECODE =
 
 test: EACH_ONCE = -m "not thorough"
 test: FOLDERS = tests
@@ -57,7 +57,10 @@ test test-all: setup-dev
 	@$(BIN)/python -m pytest $(WORKERS) $(EACH_ONCE) $(FOLDERS) $(ARGS)
 
 test: ## Test all that the program does; what is of the page needs node with npm, and Chromium.
-test-all: ## Test it with other robots, methods and processors too, and the research package; CI does.
+test-all: ## Test all variants and the research package too: before releases and when the kernel changes.
+
+test-research: setup-dev ## Test the research package.
+	@$(BIN)/python -m pytest $(WORKERS) -m "not thorough" research/tests $(ARGS)
 
 test-firefox: setup-dev page ## Go the page's main path in Firefox; installs Debian's where there is none.
 	@scripts/browser.sh firefox

@@ -130,6 +130,10 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
 
 
 @pytest.mark.slow
-def test_the_api_brings_in_neither_ray_nor_a_database_nor_scipy() -> None:
-    statements = "import gaitswarm.api.app, gaitswarm.api.server, gaitswarm.designs"
+def test_views_need_no_web_framework_and_the_api_neither_ray_nor_a_database_nor_scipy() -> None:
+    statements = (
+        "import gaitswarm.views.job, gaitswarm.designs, sys\n"
+        "assert not {'fastapi', 'starlette', 'uvicorn'} & set(sys.modules)\n"
+        "import gaitswarm.api.app, gaitswarm.api.server"
+    )
     assert loaded_by(statements, ["ray", "sqlalchemy", "alembic", "scipy"]) == set()

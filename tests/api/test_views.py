@@ -7,7 +7,6 @@ from dataclasses import fields, replace
 from typing import Any, get_args
 
 import numpy as np
-import pytest
 
 import gaitswarm
 from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
@@ -22,7 +21,6 @@ from gaitswarm.simulation import SimulationView, WalkLogView
 from gaitswarm.views.history import BestView, HistoryIterationView
 from gaitswarm.views.job import JobView
 from tests.api.conftest import Commit
-from tests.examples.processes import loaded_by
 
 
 def strict(text: str) -> Any:
@@ -134,9 +132,3 @@ def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
     assert view.search.difference == -0.5
     assert strict(view.model_dump_json())["search"]["difference"] == -0.5
     assert BestView.from_evaluation(found, job.spec).search is None
-
-
-@pytest.mark.slow
-def test_views_can_be_had_without_a_web_framework() -> None:
-    statements = "import gaitswarm.views.job, gaitswarm.designs"
-    assert loaded_by(statements, ["fastapi", "starlette", "uvicorn"]) == set()

@@ -127,7 +127,7 @@ def test_the_best_of_a_job_is_certified_with_its_robot_and_preference(files: Pat
         "--db", files / "jobs.db", "--json",
     ).json  # fmt: skip
     result = run_command(
-        "certify", job["id"], "--worlds", 5, *SMALL, "--db", files / "jobs.db", "--json"
+        "certify", job["id"], "--worlds", 2, *SMALL, "--db", files / "jobs.db", "--json"
     )
     assert result.code == 0, result.err
     found = result.json
@@ -140,10 +140,10 @@ def test_the_best_of_a_job_is_certified_with_its_robot_and_preference(files: Pat
     assert nominal == job["best"]["scenarios"]["short"]["utility"]
     # A certificate's own identifier goes on with it.
     more = run_command(
-        "certify", found["job"], "--worlds", 8, "--evaluator", "in-process",
+        "certify", found["job"], "--worlds", 3, "--evaluator", "in-process",
         "--db", files / "jobs.db", "--json",
     ).json  # fmt: skip
-    assert (more["job"], more["worlds"]) == (found["job"], 8)
+    assert (more["job"], more["worlds"]) == (found["job"], 3)
 
 
 def test_users_choose_ranges_and_fixed_values(files: Path) -> None:

@@ -46,7 +46,7 @@ def writing_commands(finished: Finished) -> dict[str, tuple[str | Path, ...]]:
 WRITING = ["help", "help of a command", "version", "JSON, written as it is read", "a table"]
 
 
-@pytest.mark.variants("JSON, written as it is read-unbuffered", "a table-")
+@pytest.mark.variants("a table-")
 @pytest.mark.slow
 @pytest.mark.parametrize("buffered", [BUFFERED, {"PYTHONUNBUFFERED": "1"}], ids=["", "unbuffered"])
 @pytest.mark.parametrize("kind", WRITING)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import socket
@@ -18,7 +17,7 @@ from gaitswarm.services.runtime import open_store
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
+from tests.examples.processes import eventually, line_with
 
 pytestmark = pytest.mark.slow
 
@@ -130,19 +129,3 @@ def test_an_optimization_fails_if_its_database_is_overwritten(
     out, err = process.communicate(timeout=120)
     assert (process.returncode, out) == (5, "")
     assert f"gaitswarm: database {db}" in err
-
-
-def test_an_optimization_on_the_default_workers_gives_the_bits_of_threads_and_ends_quietly(
-    gaitswarm: Gaitswarm, small_spec: Path, db: Path, tmp_path: Path
-) -> None:
-    options = ("optimize", "--spec", small_spec, "--db", db, "--json")
-    process = start_python(*COMMAND_LINE, *options, "--cpus", "1")
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == 0, err
-    job = json.loads(out)
-    assert len(err.splitlines()) <= 4, err
-    other = tmp_path / "other.db"
-    here = gaitswarm(
-        "optimize", "--spec", small_spec, "--db", other, "--evaluator", "in-process", "--json"
-    ).json
-    assert _bits(gaitswarm, job["id"], db) == _bits(gaitswarm, here["id"], other)

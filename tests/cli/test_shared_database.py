@@ -52,14 +52,14 @@ def test_optimize_keeps_its_job_while_a_server_runs(
 def test_resuming_a_job_that_a_server_runs_follows_it_to_its_end(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
-    spec = write_json(SMALL_SPEC | {"iterations": 120})
+    spec = write_json(SMALL_SPEC | {"iterations": 40})
     job_id = gaitswarm("submit", "--spec", spec, "--server", server).out.strip()
     eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > 0)
     resumed = gaitswarm("optimize", "--resume", job_id, "--db", db, "--json")
     assert resumed.code == 0, resumed.err
-    assert (resumed.json["state"], resumed.json["iterations"]) == ("succeeded", 120)
+    assert (resumed.json["state"], resumed.json["iterations"]) == ("succeeded", 40)
     assert "another process runs this job" in resumed.err
-    assert "120/120 iterations: best" in resumed.err
+    assert "40/40 iterations: best" in resumed.err
 
 
 def test_ctrl_c_stops_following_and_names_the_command_to_continue(
@@ -79,6 +79,9 @@ def test_ctrl_c_stops_following_and_names_the_command_to_continue(
     assert gaitswarm("cancel", job_id, "--server", server).code == 0
 
 
+@pytest.mark.thorough(
+    "test_a_job_lost_to_another_process_is_followed_there_and_nothing_is_reported_twice"
+)
 def test_an_optimization_that_lost_its_lease_follows_its_job(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
@@ -120,7 +123,7 @@ def test_identify_follows_runs_that_a_server_claims(
     recording = gaitswarm("record", log, *of_walk, "--db", db).out.strip()
     fitted = gaitswarm(
         "identify", recording, "--variables", "body_mass", "--runs", "3", "--db", db, *IN_PROCESS,
-        "--particles", "6", "--iterations", "30", "--json",
+        "--particles", "4", "--iterations", "15", "--json",
     )  # fmt: skip
     assert fitted.code == 0, fitted.err
     assert len(fitted.json["jobs"]) == 3

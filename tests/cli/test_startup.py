@@ -97,6 +97,7 @@ def test_wrong_usage_is_exit_code_2(gaitswarm: Gaitswarm, arguments: list[str]) 
     assert result.out == ""
 
 
+@pytest.mark.variants("simulate --help")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["simulate --help", "history {id} --json"])
 def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -> None:

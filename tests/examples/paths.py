@@ -16,6 +16,9 @@ QUADRUPED: Final = ROOT / "examples" / "quadruped"
 
 
 def copy_package(folder: Path) -> Path:
-    """Copy the package into a folder, its symbolic links followed, and return its new path."""
-    ignored = shutil.ignore_patterns("__pycache__", "page", "manual", "prebuilt")
+    """Copy the package into a folder, its symbolic links followed, and return its new path.
+
+    With its bytecode, which is valid there: compiling all modules takes longer than most tests.
+    """
+    ignored = shutil.ignore_patterns("page", "manual", "prebuilt")
     return shutil.copytree(ROOT / "gaitswarm", folder / "gaitswarm", ignore=ignored)

@@ -370,7 +370,7 @@ def test_an_event_loop_continues_while_it_runs_a_job(db: Path, finished: Finishe
 
 def test_a_task_that_is_cancelled_gives_its_job_back(db: Path) -> None:
     # Long enough not to end before the cancellation is heard.
-    long = {**SMALL, "iterations": 20}
+    long = {**SMALL, "iterations": 8}
 
     async def work() -> gaitswarm.JobView:
         async with gaitswarm.open_async(db) as jobs:

@@ -37,9 +37,15 @@ class TestBuiltIn(SearchContract):
             self.seeds = 3
 
 
-def test_another_process_continues_with_the_same_bits() -> None:
+@pytest.mark.variants("of few seconds")
+@pytest.mark.parametrize(
+    "methods",
+    [[name for name in INSTALLED if name not in REPLAYED_UNTIL], list(REPLAYED_UNTIL)],
+    ids=["of few seconds", "replayed"],
+)
+def test_another_process_continues_with_the_same_bits(methods: list[str]) -> None:
     given, expected = {}, {}
-    for method in INSTALLED:
+    for method in methods:
         stopped = search(method)
         done = list(path(stopped, method, evaluations=BUDGET // 2))
         given[method] = stopped.dump()

@@ -32,11 +32,11 @@ SPEC = JobSpec.model_validate(
     {
         "controller": "fuzzy-pi",
         "scenarios": [
-            SHORT_WALK | {"name": "level", "cycle_time": 1.5, "cycles": 2},
-            UPHILL_WALK | {"cycles": 2},
+            SHORT_WALK | {"name": "level", "cycles": 2},
+            UPHILL_WALK,
         ],
         "optimizer": {"name": "pso", "particles": 5},
-        "iterations": 12,
+        "iterations": 10,
         "seed": 4,
     }
 )

@@ -58,18 +58,27 @@ MARK = "pytest.mark.thorough"
 def _tests() -> Iterator[tuple[str, list[str] | None]]:
     """Every test function, and why it is thorough as a whole; None where it is not."""
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
-        module = ast.parse(path.read_text(encoding="utf-8"))
-        of_module = [
-            mark
-            for node in module.body
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
-            for mark in (node.value.elts if isinstance(node.value, ast.List) else [node.value])
-        ]
-        for node in ast.walk(module):
-            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-                marks = [mark for mark in (*of_module, *node.decorator_list) if _is_thorough(mark)]
-                why = [reason for mark in marks for reason in _reasons(mark)]
-                yield node.name, why if marks else None
+        text = path.read_text(encoding="utf-8")
+        names = re.findall(r"^ *def (test_\w+)", text, re.MULTILINE)
+        why = _thorough_tests(ast.parse(text)) if MARK in text else {}
+        yield from ((name, why.get(name)) for name in names)
+
+
+def _thorough_tests(module: ast.Module) -> dict[str, list[str]]:
+    """Why tests of a module are thorough, by name."""
+    of_module = [
+        mark
+        for node in module.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
+        for mark in (node.value.elts if isinstance(node.value, ast.List) else [node.value])
+    ]
+    found = {}
+    for node in ast.walk(module):
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            marks = [mark for mark in (*of_module, *node.decorator_list) if _is_thorough(mark)]
+            if marks:
+                found[node.name] = [reason for mark in marks for reason in _reasons(mark)]
+    return found
 
 
 def _is_thorough(mark: ast.expr) -> bool:

@@ -20,7 +20,7 @@ from tests.store.examples import LEASE, spec
 # The fixture's database is shared by the examples on purpose: each makes a job of its own.
 many = settings(
     deadline=None,
-    max_examples=25,
+    max_examples=12,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 awkward = st.sampled_from(

@@ -71,11 +71,17 @@ def other_version(folder: Path) -> dict[str, str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(120)
-def test_without_cpus_requests_fail_with_the_reason_and_a_worker_of_another_version_is_refused(
-    host: Process, runner: Process, tmp_path: Path
-) -> None:
+def test_without_cpus_requests_fail_with_the_reason(host: Process, runner: Process) -> None:
     reason = runner.run(cluster_runner.reason_against, SMALL)
     assert reason == ("EvaluatorUnavailable: no node of the Ray cluster has a CPU for simulations")
+
+
+@pytest.mark.thorough("test_walks_of_another_provenance_are_refused_in_words")
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_a_worker_of_another_version_is_refused(
+    host: Process, runner: Process, tmp_path: Path
+) -> None:
     old = host.run(cluster_host.add, environment=other_version(tmp_path))
     runner.run(cluster_runner.wait_for_slots, 1)
     reason = runner.run(cluster_runner.reason_against, SMALL)
@@ -142,9 +148,7 @@ def test_a_job_on_three_nodes_of_which_one_is_lost_every_few_seconds_has_the_sam
     assert history(store, there) == history(store, here)
 
 
-@pytest.mark.thorough(
-    "test_without_cpus_requests_fail_with_the_reason_and_a_worker_of_another_version_is_refused"
-)
+@pytest.mark.thorough("test_without_cpus_requests_fail_with_the_reason")
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_head_that_is_killed_is_noticed_within_seconds(host: Process, runner: Process) -> None:

@@ -17,8 +17,9 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.runtime import run_embedded
 from gaitswarm.services.worker.in_process import InProcessEvaluator
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
+from tests.examples.processes import eventually, line_with
 from tests.examples.servers import ServerProcess
 from tests.worker import cluster_host
 from tests.worker.cluster_host import Process
@@ -113,9 +114,8 @@ def test_a_runner_that_waits_for_its_cluster_ends_when_it_is_stopped(
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as reserved:
         address = f"127.0.0.1:{reserved.getsockname()[1]}"
-    runner = start_python(
-        *(*COMMAND_LINE, "runner", "--db", database, "--evaluator", "ray"),
-        *("--ray-address", address),
+    runner = ForkedCommand(
+        *("runner", "--db", database, "--evaluator", "ray", "--ray-address", address)
     )
     line_with(runner.stderr, f"jobs wait for workers: no Ray cluster .*'{address}'")
     line_with(runner.stderr, "ready: 0 slots")

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 MORE_CASES_THAN_SLOTS = (*SCENARIOS, short_walk(name="slower", cycle_time=1.2))
 
 
-@pytest.mark.variants("*-1-2", "*-7-3", "in_process-41-3")
+@pytest.mark.variants("in_process-1-2", "*-7-3")
 @pytest.mark.parametrize("scenarios", [SCENARIOS, MORE_CASES_THAN_SLOTS], ids=["2", "3"])
 @pytest.mark.parametrize("count", [1, 7, 41])
 def test_results_are_those_of_one_batch_in_index_order_to_the_bit(
@@ -87,6 +87,7 @@ def test_work_is_dropped_when_it_is_stopped(evaluator: Evaluator) -> None:
     assert time.monotonic() - begun < 10.0
 
 
+@pytest.mark.variants("in_process")
 def test_whether_to_stop_is_asked_at_least_once_a_second(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:

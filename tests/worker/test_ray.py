@@ -43,7 +43,7 @@ def test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits(
     ray_evaluator: RayEvaluator,
 ) -> None:
     wanted = request(300)
-    expected = bits(ray_evaluator.evaluate(wanted, never))
+    expected = bits(walked_at_once(wanted))
     killed: list[int] = []
 
     def kill_one_at_work() -> None:

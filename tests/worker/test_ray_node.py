@@ -30,6 +30,7 @@ def is_alive(port: int) -> bool:
     return python("-m", "gaitswarm.services.worker.ray_node", "--check", str(port)).returncode == 0
 
 
+@pytest.mark.thorough("a node that is started again by what supervises it")
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_a_node_whose_raylet_ends_by_itself_ends_with_an_error_and_all_its_processes(

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+    from gaitswarm.robots import RobotCheckView
     from gaitswarm.robustness_index import RobustnessView
     from gaitswarm.services.optimizer.analysis.front import FrontView, NormalisedDesignView
     from gaitswarm.services.optimizer.analysis.identifiability import (
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
     from gaitswarm.sim.measurement.synchronise import Synchronised
     from gaitswarm.sim.validation import Comparison
-    from gaitswarm.views.robots import RobotCheckView
 
 _STYLE: Final[dict[Any, Any]] = {
     "axes.axisbelow": True,

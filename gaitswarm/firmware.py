@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, TypedDict
+from typing import Any, Final, TypedDict, Unpack
 
 from pydantic import Field, ValidationError
 
 from gaitswarm.designs import ScenariosRequest
 from gaitswarm.errors import InvalidRequest, NotFound, invalid_request, simulation_errors
+from gaitswarm.robots import replaced_folder
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.views import Finite, View
@@ -30,8 +29,6 @@ from gaitswarm.sim.firmware import (
     firmware_of,
 )
 from gaitswarm.sim.input import Line
-from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
 from gaitswarm.views.history import BestView
 
@@ -263,12 +260,7 @@ def firmware_view(
 def write_firmware(
     design: Mapping[str, float | str],
     output: str | os.PathLike[str],
-    *,
-    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
-    controller: ControllerName = "fuzzy-pi",
-    robot: RobotInput = DEFAULT_ROBOT,
-    label: str = "design",
-    table_bits: tuple[int, int] | None = None,
+    **options: Unpack[FirmwareOptions],
 ) -> FirmwareView:
     """Write a design as C99 for a leg's microcontroller (thesis chapter 5), with a test of it.
 
@@ -279,14 +271,8 @@ def write_firmware(
         design: Value of each of the controller's variables, and of any gait variable, in their
             units.
         output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
-        scenarios: Names or numbers of presets, or `Scenario`: whose trajectories are written and
-            whose walks are repeated.
-        controller: Motor controller that drives the robot.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        label: Display name of the design.
-        table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
-            place of 10 and 6, where there is less flash; simulations use this table, and their
-            difference from those with the default one is reported.
+        **options: Robot, controller, scenarios and tables, see `FirmwareOptions`. With other
+            `table_bits` than the default's, the difference of simulations is reported.
 
     Returns:
         Files, their sizes, and their memory on the thesis's microcontroller.
@@ -296,15 +282,7 @@ def write_firmware(
             holds anything but firmware or cannot be written; names the argument.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    arguments = {
-        "design": design,
-        "scenarios": scenarios,
-        "controller": controller,
-        "robot": robot,
-        "label": label,
-        "table_bits": table_bits,
-    }
-    request = checked(FirmwareRequest, arguments)
+    request = checked(FirmwareRequest, {"design": design, **options})
     check_replaceable(output)
     firmware = run_firmware(request)
     write_folder(output, firmware.files)
@@ -333,7 +311,7 @@ def check_replaceable(output: str | os.PathLike[str]) -> None:
 
 def write_folder(output: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
     """Write files into a folder, replacing its contents."""
-    with _replacing(Path(output)) as new:
+    with replaced_folder(Path(output)) as new:
         for name, content in files.items():
             path = new / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -348,27 +326,3 @@ def _written_files(folder: Path) -> set[str]:
     except (OSError, ValueError, KeyError, TypeError):
         pass
     return set()
-
-
-@contextmanager
-def _replacing(folder: Path) -> Iterator[Path]:
-    """A temporary folder that replaces the other one unless an exception is raised."""
-    try:
-        target = folder.resolve()
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(
-            dir=target.parent, prefix=f".{target.name}.", ignore_cleanup_errors=True
-        ) as scratch:
-            new, old = Path(scratch) / "new", Path(scratch) / "old"
-            new.mkdir()
-            yield new
-            if target.exists():
-                target.rename(old)
-            try:
-                new.rename(target)
-            except OSError:
-                if old.exists():
-                    old.rename(target)
-                raise
-    except OSError as error:
-        raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error

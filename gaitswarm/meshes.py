@@ -1,4 +1,4 @@
-"""Meshes of a URDF: next to it, or in ROS packages."""
+"""Meshes of a URDF, next to it or in ROS packages; no simulation needs them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from typing import Final, Literal
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 
+from pydantic import Field
+
 from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.robot.bounds import LONGEST_URDF, check_urdf
+from gaitswarm.views.base import PREFIX
 
 MeshFormat = Literal["stl", "obj", "dae"]
 
@@ -36,19 +40,33 @@ _MOST_ROBOTS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class FoundMesh:
-    """A mesh that a URDF names.
+    """A mesh that a URDF names."""
 
-    Attributes:
-        name: as the URDF has it.
-        path: of its file, without links; None if it is not served.
-        form: of its file, by its ending.
-        problem: why it is not served; None if it is.
-    """
+    name: str  # as the URDF has it
+    path: Path | None  # of its file, without links; None if it is not used
+    form: MeshFormat | None  # by the name's ending
+    problem: str | None  # why it is not used; None if it is
 
-    name: str
-    path: Path | None
-    form: MeshFormat | None
-    problem: str | None
+
+class MeshFileView(View):
+    """A mesh that a robot's URDF names, and whether this server has its file."""
+
+    name: str = Field(description="As the URDF has it.", examples=["meshes/hip.stl"])
+    format: MeshFormat | None = Field(
+        description="Media type by file extension; null if the file is not served.",
+        examples=["stl"],
+    )
+    url: str | None = Field(
+        description="Path of the file; null if it is not served.",
+        examples=["/v1/robots/" + 64 * "0" + "/meshes/0"],
+    )
+    problem: str | None = Field(description="Why it is not served; null if it is.", examples=[None])
+
+    @classmethod
+    def from_mesh(cls, digest: str, number: int, mesh: FoundMesh) -> MeshFileView:
+        """Make a view of a mesh."""
+        url = None if mesh.path is None else f"{PREFIX}/robots/{digest}/meshes/{number}"
+        return cls(name=mesh.name, format=mesh.form, url=url, problem=mesh.problem)
 
 
 def urdf_digest(urdf: str) -> str:
@@ -72,7 +90,7 @@ class MeshLibrary:
         """Meshes of a robot."""
         for folder, text in self._robots():
             if urdf_digest(text) == digest:
-                return tuple(_found(name, folder) for name in mesh_names(text))
+                return tuple(found_mesh(name, folder, inside=True) for name in mesh_names(text))
         return ()
 
     def content(self, digest: str, number: int) -> bytes:
@@ -80,16 +98,9 @@ class MeshLibrary:
         meshes = self.of(digest)
         if number >= len(meshes):
             raise NotFound(f"the robot has no mesh {number}, but {len(meshes)} in all")
-        mesh = meshes[number]
-        if mesh.path is None:
-            raise NotFound(f"mesh {mesh.name[:200]}: {mesh.problem}")
-        try:
-            with mesh.path.open("rb") as file:
-                content = file.read(LARGEST_MESH + 1)
-        except OSError as error:
-            raise NotFound(f"mesh {mesh.name[:200]}: {error.strerror}") from error
-        if len(content) > LARGEST_MESH:
-            raise NotFound(f"mesh {mesh.name[:200]}: {TOO_LARGE}")
+        content = _content(meshes[number])
+        if isinstance(content, str):
+            raise NotFound(f"mesh {meshes[number].name[:200]}: {content}")
         return content
 
     def _robots(self) -> Iterator[tuple[Path, str]]:
@@ -110,28 +121,6 @@ def _inside(folder: Path) -> list[Path]:
         return sorted(place for place in folder.iterdir() if place.is_dir())
     except OSError:
         return []
-
-
-def _found(name: str, folder: Path) -> FoundMesh:
-    form = FORMS.get(Path(name).suffix.lower())
-    if form is None:
-        return FoundMesh(name, None, None, NOT_A_MESH)
-    outside = False
-    for root, path in mesh_places(name, folder):
-        try:
-            real = path.resolve(strict=True)
-            if not real.is_file() or FORMS.get(real.suffix.lower()) != form:
-                continue
-            if not real.is_relative_to(root.resolve(strict=True)):
-                outside = True
-                continue
-            if real.stat().st_size > LARGEST_MESH:
-                return FoundMesh(name, None, form, TOO_LARGE)
-        except (OSError, ValueError, RuntimeError):  # not there, or a loop of links
-            continue
-        return FoundMesh(name, real, form, None)
-    said = "its file is outside of the robot's folder" if outside else NOT_FOUND
-    return FoundMesh(name, None, form, said)
 
 
 LARGEST_COPY: Final = 256 * 1024 * 1024
@@ -158,17 +147,16 @@ def copy_meshes(urdf: str, folder: Path, output: Path, packages: Sequence[Path] 
 
     No simulation needs them: one that is missing, no mesh or too large is left out.
     """
-    sources: dict[Path, Path] = {}
+    sources: dict[Path, Path | None] = {}
     copied, left_out, size = [], [], 0
     for name in mesh_names(urdf):
-        found = _source(name, folder, packages)
-        content = found if isinstance(found, str) else _content(found)
-        place = own_place(name)
-        if isinstance(found, str) or isinstance(content, str):
-            left_out.append((name, str(content)))
+        mesh, place = found_mesh(name, folder, packages), own_place(name)
+        content = _content(mesh)
+        if isinstance(content, str):
+            left_out.append((name, content))
         elif place is None:
             left_out.append((name, "its name is absolute, or leads out of its package"))
-        elif sources.setdefault(place, found) != found:
+        elif sources.setdefault(place, mesh.path) != mesh.path:
             left_out.append((name, f"another one is {place.as_posix()} in the folder"))
         elif size + len(content) > LARGEST_COPY:
             left_out.append((name, f"all have more than {LARGEST_COPY // 2**20} MiB"))
@@ -181,25 +169,15 @@ def copy_meshes(urdf: str, folder: Path, output: Path, packages: Sequence[Path] 
     return MeshCopies(tuple(copied), size, tuple(left_out))
 
 
-def _source(name: str, folder: Path, packages: Sequence[Path]) -> Path | str:
-    """The file of a mesh, without links, or why there is none."""
-    form = FORMS.get(Path(name).suffix.lower())
-    if form is None:
-        return NOT_A_MESH
-    found = find_mesh(name, folder, packages)
-    if found is None:
-        return NOT_FOUND
-    real = found.resolve()
-    return real if FORMS.get(real.suffix.lower()) == form else NOT_A_MESH
-
-
-def _content(path: Path) -> bytes | str:
-    """Of a mesh, or why it is not copied."""
+def _content(mesh: FoundMesh) -> bytes | str:
+    """The content of a mesh, or why it is not used."""
+    if mesh.path is None:
+        return str(mesh.problem)
     try:
-        with path.open("rb") as file:
+        with mesh.path.open("rb") as file:
             content = file.read(LARGEST_MESH + 1)
     except OSError as error:
-        return f"cannot read {path}: {error.strerror}"
+        return f"its file cannot be read: {error.strerror}"
     return TOO_LARGE if len(content) > LARGEST_MESH else content
 
 
@@ -219,24 +197,43 @@ def mesh_names(urdf: str) -> list[str]:
     return list(dict.fromkeys(name for name in named if name))
 
 
-def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | None:
+def found_mesh(
+    name: str, folder: Path, packages: Sequence[Path] = (), *, inside: bool = False
+) -> FoundMesh:
     """Look for a mesh.
 
     `package://NAME/PATH` is looked for in folders of that name: the URDF's own and those above it,
     those given, those of ROS_PACKAGE_PATH, and their subfolders. Another path is relative
     to the URDF's folder. A mesh found nowhere else may be a copy at its `own_place`.
+
+    inside: accept only files in the URDF's folder or in the package that the name has.
     """
-    scheme, _, rest = name.partition("://")
-    if scheme == "file":
-        return _file(Path(unquote(rest)))
-    places = (_file(path) for _, path in mesh_places(name, folder, packages))
-    return next((found for found in places if found is not None), None)
+    form = FORMS.get(Path(name).suffix.lower())
+    if form is None:
+        return FoundMesh(name, None, None, NOT_A_MESH)
+    problem, places = NOT_FOUND, mesh_places(name, folder, packages)
+    if name.startswith("file://") and not inside:
+        places = iter([(folder, Path(unquote(name.removeprefix("file://"))))])
+    for root, path in places:
+        try:
+            real = path.resolve(strict=True)
+            if not real.is_file() or FORMS.get(real.suffix.lower()) != form:
+                continue
+            if inside and not real.is_relative_to(root.resolve(strict=True)):
+                problem = "its file is outside of the robot's folder"
+                continue
+            if real.stat().st_size > LARGEST_MESH:
+                return FoundMesh(name, None, form, TOO_LARGE)
+        except (OSError, ValueError, RuntimeError):  # not there, or a loop of links
+            continue
+        return FoundMesh(name, real, form, None)
+    return FoundMesh(name, None, form, problem)
 
 
 def mesh_places(
     name: str, folder: Path, packages: Sequence[Path] = ()
 ) -> Iterator[tuple[Path, Path]]:
-    """Places where `find_mesh` looks for a mesh next to the URDF or in a package."""
+    """Yield the places of a mesh next to the URDF or in a package, each with its root."""
     scheme, separator, rest = name.partition("://")
     if not separator:
         yield folder, folder / name
@@ -275,10 +272,3 @@ def _in_packages(rest: str, folder: Path, packages: Sequence[Path]) -> Iterator[
     for place in places:
         for root in ([place] if place.resolve().name == package else []) + [place / package]:
             yield root, root / path
-
-
-def _file(path: Path) -> Path | None:
-    try:
-        return path if path.is_file() else None
-    except (OSError, ValueError):  # a name that no file can have
-        return None

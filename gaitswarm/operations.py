@@ -38,6 +38,7 @@ from gaitswarm.firmware import (
     firmware_view,
     run_firmware,
 )
+from gaitswarm.meshes import MeshFileView, MeshLibrary
 from gaitswarm.recordings import (
     MeasuredWalkRequest,
     MeasuredWalkView,
@@ -46,7 +47,7 @@ from gaitswarm.recordings import (
     read_measured_walk,
 )
 from gaitswarm.replay import ReplayRequest, run_replay
-from gaitswarm.robots import RobotDraftRequest, run_robot_draft
+from gaitswarm.robots import RobotCheckView, RobotDraftRequest, RobotDraftView, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.robustness_index import (
     RobustnessRequest,
@@ -124,7 +125,6 @@ from gaitswarm.views.job import (
     StateView,
 )
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
-from gaitswarm.views.robots import MeshFileView, RobotCheckView, RobotDraftView
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import zipped
@@ -1200,8 +1200,6 @@ def list_meshes(
     Empty for a robot that is in none of the folders of GAITSWARM_ROBOTS. Simulations need no
     meshes.
     """
-    from gaitswarm.meshes import MeshLibrary
-
     meshes = MeshLibrary(folders).of(digest)
     return CatalogueView(
         items=[MeshFileView.from_mesh(digest, k, mesh) for k, mesh in enumerate(meshes)]
@@ -1224,8 +1222,6 @@ def get_mesh(
     Only files of at most 32 MiB that the robot's URDF names, in the robot's folder or in the
     package that the URDF names.
     """
-    from gaitswarm.meshes import MeshLibrary
-
     return MeshLibrary(folders).content(digest, number)
 
 

@@ -24,7 +24,6 @@ from gaitswarm.sim.robot.shapes import Role
 from gaitswarm.sim.robot.urdf import SolidKind
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
 from gaitswarm.simulation import QUANTITIES
-from gaitswarm.views.robots import LinkMeshView
 
 VERSION: Final = 1
 
@@ -87,6 +86,26 @@ class ShapeView(View):
         description="Of the solid's centre in its link's frame: x, y, z [m], quaternion x, y, z, w."
     )
     role: Role = Field(description="Part of the robot that it shows.")
+
+
+class LinkMeshView(View):
+    """A mesh on a link, for display only."""
+
+    name: str = Field(
+        description="Of its file, as the URDF has it.",
+        examples=["package://a1_description/meshes/hip.dae"],
+    )
+    origin: tuple[float, float, float, float, float, float, float] = Field(
+        description="Of its frame in its link's: x, y, z [m], then quaternion x, y, z, w.",
+        examples=[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]],
+    )
+    scale: tuple[float, float, float] = Field(
+        description="Along its own x, y and z [1].", examples=[[0.001, 0.001, 0.001]]
+    )
+    colour: tuple[float, float, float, float] | None = Field(
+        description="Red, green, blue and opacity of its material, 0 to 1; null for none.",
+        examples=[[0.1, 0.1, 0.1, 1.0]],
+    )
 
 
 class LinkView(View):

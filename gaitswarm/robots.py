@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -16,18 +16,18 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.meshes import FORMS, LARGEST_MESH, MeshCopies, copy_meshes, find_mesh, mesh_names
+from gaitswarm.meshes import FoundMesh, MeshCopies, copy_meshes, found_mesh, mesh_names
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
+from gaitswarm.services.optimizer.views import Request, View
 from gaitswarm.sim.controllers.joint_pd import LARGEST_GAIN
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.apart import propose_apart, walking_proposal
-from gaitswarm.sim.proposal.document import Proposal
 from gaitswarm.sim.proposal.drive import GRAVITY, ActuatorChoice
 from gaitswarm.sim.proposal.frame import Axis, Frame
 from gaitswarm.sim.proposal.gait import walk_of_robot
@@ -47,13 +47,7 @@ from gaitswarm.sim.robot.shapes import mesh_bounds
 from gaitswarm.sim.robot.urdf import unphysical
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import simulate
-from gaitswarm.views.robots import (
-    CheckedLegView,
-    MeshView,
-    RobotCheckView,
-    RobotDraftView,
-    StandingStillView,
-)
+from gaitswarm.sim.variables import Variable
 
 if TYPE_CHECKING:
     from gaitswarm.sim.simulate import Simulation
@@ -124,6 +118,66 @@ def robot_defaults(folder: str | os.PathLike[str]) -> RobotDefaults:
     return RobotDefaults(document)
 
 
+class CheckedLegView(View):
+    """A leg."""
+
+    name: str = Field(description="Of the leg.", examples=["FL"])
+    joints: list[str] = Field(description="Its joints, from the body on.")
+    foot: str = Field(description="Link or fixed joint at its end.")
+    length: float = Field(description="From the first joint to the foot, stretched [m].")
+    mass: float = Field(description="Of its three links with what is fixed to them [kg].")
+    reach: float = Field(
+        description="How far the foot gets below the highest hip within the joints' limits [m]."
+    )
+    points: list[tuple[float, float, float]] = Field(
+        description="Where its joints and its foot are in the body's frame when it stands [m]."
+    )
+
+
+class StandingStillView(View):
+    """Result of standing still with all joints held as stiffly as possible."""
+
+    seconds: float = Field(description="For how long [s].")
+    normal_forces: float = Field(description="Sum over the feet, mean of the last fifth [N].")
+    weight: float = Field(description="Of the robot [N].")
+    height: float = Field(description="Of the body's origin over the ground at the end [m].")
+
+
+class MeshView(View):
+    """A mesh that the URDF names, for display only."""
+
+    name: str = Field(
+        description="As the URDF has it.", examples=["package://a1_description/meshes/hip.dae"]
+    )
+    path: Path | None = Field(description="File that was found; null for none.")
+
+
+class RobotCheckView(View):
+    """A loaded robot and how it stands."""
+
+    name: str = Field(description="Of the robot.")
+    mass: float = Field(description="Without load [kg].")
+    body_mass: float = Field(
+        description="Of the body with all that is held or fixed to it, without legs [kg]."
+    )
+    joints: int = Field(description="That move.")
+    legs: list[CheckedLegView] = Field(description="In the order of robot.toml.")
+    held: dict[str, float] = Field(description="Joints of no leg, each with its angle [rad].")
+    centre_of_mass: tuple[float, float, float] = Field(
+        description="In the body's frame when it stands [m]."
+    )
+    standing: StandingStillView = Field(description="How it stands.")
+    meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
+    guesses: list[str] = Field(
+        description="Guesses of `robot init` that are still in robot.toml, one sentence each."
+    )
+    warnings: list[str] = Field(description="What is unphysical or was guessed badly.")
+    parameters: list[Variable] = Field(
+        default_factory=list,
+        description="What an identification or calibration may fit of it, with bounds.",
+    )
+
+
 _SECONDS: Final = 1.0
 _STIFF: Final = 20.0
 """Stiffness with which torque-controlled joints are held, per torque limit [1/rad]."""
@@ -155,6 +209,10 @@ def check_robot(
     points = leg_points(robot, angles)
     mass = feet_and_centre_of_mass(robot, angles[None, :], 0.0)[1][0]
     carried = {joint.name: joint.child for joint in robot.urdf.joints}
+    meshes: list[FoundMesh] = []
+    if folder is not None:
+        places = [Path(package) for package in packages]
+        meshes = [found_mesh(name, Path(folder), places) for name in mesh_names(files.urdf)]
     return RobotCheckView(
         name=robot.description.name,
         mass=robot.mass,
@@ -178,17 +236,10 @@ def check_robot(
         held=dict(robot.description.held_joints),
         centre_of_mass=mass.tolist(),
         standing=standing,
-        meshes=[] if folder is None else _meshes(files.urdf, Path(folder), map(Path, packages)),
+        meshes=[MeshView(name=mesh.name, path=mesh.path) for mesh in meshes],
         guesses=list(robot.description.guesses),
         warnings=[*warnings, *unphysical(robot.urdf, files.urdf)],
     )
-
-
-def _meshes(urdf: str, folder: Path, packages: Iterable[Path]) -> list[MeshView]:
-    """What the URDF names, each with the file that was found."""
-    places = list(packages)
-    found = {name: find_mesh(name, folder, places) for name in mesh_names(urdf)}
-    return [MeshView(name=n, path=None if p is None else str(p)) for n, p in found.items()]
 
 
 def standing_scenario(robot: Robot) -> Scenario:
@@ -283,7 +334,10 @@ def init_robot(
     What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.
     """
     source, folder = Path(urdf), Path(output)
-    _check_free(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InvalidRequest(
+            f"{folder} exists and is not empty; name another folder", field="output"
+        )
     try:
         with source.open(encoding="utf-8") as file:
             text = file.read(LONGEST_URDF + 1)
@@ -295,13 +349,21 @@ def init_robot(
     check_name(chosen)
     frame = frame_of(up, forward)
     try:
-        bounds = partial(_bounds, folder=source.parent, packages=[Path(p) for p in packages])
+        places = [Path(package) for package in packages]
+        bounds = partial(_bounds, folder=source.parent, packages=places)
         proposal = walking_proposal(text, chosen, actuator, frame, bounds)
     except RobotFileError as error:
         said = str(error).replace("robot.urdf", source.name, 1)
         raise InvalidRequest(said, field="urdf") from error
     with simulation_errors("urdf"):
-        copies = _write(folder, proposal, source.parent if meshes else None, packages)
+        job = json.dumps(proposal.job, indent=2) + "\n"
+        texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
+        copies = MeshCopies()
+        with replaced_folder(folder) as made:
+            for path, content in texts.items():
+                (made / path).write_text(content, encoding="utf-8")
+            if meshes:
+                copies = copy_meshes(proposal.urdf, source.parent, made, places)
     return MadeRobot(chosen, proposal.notes, copies)
 
 
@@ -347,54 +409,37 @@ def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
 
 
 def _bounds(name: str, folder: Path, packages: Sequence[Path]) -> NDArray[np.float64] | None:
-    """Bounds of a mesh that is found and not too large."""
-    path = find_mesh(name, folder, packages)
-    if path is None or path.suffix.lower() not in FORMS or path.stat().st_size > LARGEST_MESH:
-        return None
-    return mesh_bounds(path)
+    """Bounds of a mesh that can be used."""
+    path = found_mesh(name, folder, packages).path
+    return None if path is None else mesh_bounds(path)
 
 
-def _check_free(folder: Path) -> None:
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InvalidRequest(
-            f"{folder} exists and is not empty; name another folder", field="output"
-        )
-
-
-def _write(
-    folder: Path,
-    proposal: Proposal,
-    source: Path | None,
-    packages: Sequence[str | os.PathLike[str]],
-) -> MeshCopies:
-    """Write a robot's folder, with the meshes of a source folder if there is one."""
-    copies = MeshCopies()
-    job = json.dumps(proposal.job, indent=2) + "\n"
-    texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
+@contextmanager
+def replaced_folder(folder: Path) -> Iterator[Path]:
+    """A temporary folder that replaces the other one unless an exception is raised."""
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-        try:
-            for file, text in texts.items():
-                (made / file).write_text(text, encoding="utf-8")
-            if source is not None:
-                copies = copy_meshes(proposal.urdf, source, made, [Path(p) for p in packages])
-            made.chmod(0o755)
-            if folder.exists():
-                folder.rmdir()
-            made.rename(folder)
-        except BaseException:
-            shutil.rmtree(made, ignore_errors=True)
-            raise
+        target = folder.resolve()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(
+            dir=target.parent, prefix=f".{target.name}.", ignore_cleanup_errors=True
+        ) as scratch:
+            new, old = Path(scratch) / "new", Path(scratch) / "old"
+            new.mkdir()
+            yield new
+            if target.exists():
+                target.rename(old)
+            try:
+                new.rename(target)
+            except OSError:
+                if old.exists():
+                    old.rename(target)
+                raise
     except OSError as error:
         raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error
-    return copies
 
 
-class RobotDraftRequest(BaseModel):
+class RobotDraftRequest(Request):
     """A URDF to make a robot from."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str | None = Field(
         default=None,
@@ -424,6 +469,22 @@ class RobotDraftRequest(BaseModel):
         description="Axis of its first link that points ahead, at right angles to `up`; null for x,"
         " with a warning if the legs speak against it.",
     )
+
+
+class RobotDraftView(View):
+    """A robot's files as `gaitswarm robot init` writes them; nothing is stored."""
+
+    name: str = Field(description="Of the robot.", examples=["a1"])
+    toml: str = Field(description="Text of robot.toml, with a comment on every guess.")
+    urdf: str = Field(
+        description="Text of robot.urdf: as it was sent, with a frame at the end of every leg whose"
+        " foot is no link."
+    )
+    job: dict[str, Any] = Field(
+        description="Fields of a job of this robot, unless it says otherwise: two scenarios, the"
+        " controller, bounds where they follow from the robot, the preference."
+    )
+    guesses: list[str] = Field(description="Guesses to check, one sentence each.")
 
 
 def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:

@@ -16,9 +16,8 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 if TYPE_CHECKING:
     from gaitswarm.gaits import GaitsView, GaitView
     from gaitswarm.meshes import MeshCopies
-    from gaitswarm.robots import MadeRobot
+    from gaitswarm.robots import MadeRobot, RobotCheckView
     from gaitswarm.sim.robot import RobotFiles
-    from gaitswarm.views.robots import RobotCheckView
 
 _LISTED: Final = 5
 """Missing meshes that are listed."""

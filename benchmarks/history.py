@@ -19,7 +19,7 @@ from benchmarks.large_store import fill
 from gaitswarm.services.optimizer.analysis.distribution import distribution
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, rank
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
 from gaitswarm.services.optimizer.store import Store, open_store

@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences as ranked_preferences,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind

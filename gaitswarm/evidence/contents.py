@@ -37,9 +37,13 @@ from gaitswarm.services.optimizer.analysis.certificate import CertificateView, c
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import Link
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
+from gaitswarm.services.optimizer.jobs.iteration import (
+    Evaluation,
+    EvaluationColumns,
+    Reevaluation,
+    best_particle,
+)
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -112,9 +116,9 @@ def _run(service: JobService, job: Job) -> _Run:
     best = best_of(columns, reevaluated)
     view = None if best is None else BestView.from_evaluation(best, spec)
     links = [
-        stored.link
+        link
         for first in range(0, end, _PIECE)
-        for stored in store.links(job.id, first, min(first + _PIECE, end))
+        for link in store.links(job.id, first, min(first + _PIECE, end))
     ]
     iterations = list(_iterations(service, job))
     provenance = ProvenanceDocument(

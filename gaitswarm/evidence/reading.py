@@ -23,8 +23,8 @@ from gaitswarm.evidence.archive import (
     ProvenanceDocument,
     parsed_json,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
 from gaitswarm.sim.input import message_of

@@ -44,12 +44,11 @@ from gaitswarm.services.optimizer.analysis.verification import (
     judged,
 )
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
-from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link, Outcomes
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.iteration import Reevaluation
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -457,8 +456,8 @@ def _chain(evidence: Evidence) -> Answer:
     try:
         for index, (positions, ask, digest) in enumerate(links):
             columns = evidence.columns.of_iteration(index)
-            outcomes = Outcomes.read(columns, reevaluations.get(index))
-            chain.extend(Link(index, positions, ask, digest), outcomes)
+            link = Link(index, positions, ask, digest)
+            chain.extend(link, columns, reevaluations.get(index))
     except BrokenChain as error:
         return False, str(error)
     return _intact(chain.iterations, chain.head)

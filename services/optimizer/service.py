@@ -83,7 +83,6 @@ from gaitswarm.services.optimizer.errors import (
     ProvenanceChanged,
 )
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
     MeasuredRates,
@@ -91,7 +90,7 @@ from gaitswarm.services.optimizer.jobs.estimate import (
     estimate,
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Iteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, refusal
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
@@ -190,7 +189,7 @@ class JobService:
             job,
             columns.rows(rows),
             lambda: self.asked_positions(job, request.from_iteration),
-            last.link.digest,
+            last.digest,
         )
         spec, fork = forked(parent, request, self.provenance, longest=self.longest_fork)
         seconds = self._check(spec)

@@ -9,7 +9,7 @@ import httpx2
 import pytest
 
 from gaitswarm.operations import OPERATIONS
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
 from tests.api.conftest import Commit, Serve

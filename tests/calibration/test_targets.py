@@ -13,8 +13,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     identifiability,
 )
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Reevaluation
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.sim.calibration.walk import RESULTS
 from gaitswarm.sim.variables import Variable

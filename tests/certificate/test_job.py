@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference

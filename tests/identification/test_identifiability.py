@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     Trust,
     identifiability,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.sim.variables import Variable
 
 VARIABLES = (

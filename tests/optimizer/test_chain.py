@@ -14,12 +14,11 @@ import pytest
 from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
-    Outcomes,
     ask_digest,
     encoded,
     iteration_digest,
 )
-from gaitswarm.services.optimizer.jobs.iteration import Reevaluation
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, Reevaluation
 from gaitswarm.sim.outcome import Status
 
 # RFC 8949, appendix A; floats always in 64 bits.
@@ -88,22 +87,25 @@ DOCUMENTS = ChainDocuments(
     [{"from_iteration": 0, "code": "a"}, {"from_iteration": 2, "code": "b"}],
 )
 LINK = Link(1, np.array([[0.1], [0.2]]), ask_digest(np.array([[0.1], [0.2]]), {"step": 0.5}))
-OUTCOMES = Outcomes(
+COLUMNS = EvaluationColumns(
+    iteration=np.array([1, 1]),
+    particle=np.array([0, 1]),
     designs=np.array([[0.1], [0.2]]),
     objectives=np.array([[[1.0, 2.0]], [[3.0, math.nan]]]),
     statuses=np.array([[Status.OK], [Status.FELL]], dtype=np.uint8),
     fitness=np.array([2.0, math.inf]),
-    reevaluation=Reevaluation(0, np.array([[1.5, 2.0]]), np.zeros(1, dtype=np.uint8), 2.5),
 )
+REEVALUATION = Reevaluation(0, np.array([[1.5, 2.0]]), np.zeros(1, dtype=np.uint8), 2.5)
 
 
 def digest(
     before: str = "b" * 64,
     documents: ChainDocuments = DOCUMENTS,
     link: Link = LINK,
-    outcomes: Outcomes = OUTCOMES,
+    columns: EvaluationColumns = COLUMNS,
+    reevaluation: Reevaluation | None = REEVALUATION,
 ) -> str:
-    return iteration_digest(before, documents, link, outcomes)
+    return iteration_digest(before, documents, link, columns, reevaluation)
 
 
 def test_a_digest_is_as_documented() -> None:
@@ -114,14 +116,14 @@ def test_a_digest_is_as_documented() -> None:
         "b" * 64,
         1,
         LINK.positions,
-        OUTCOMES.designs,
-        OUTCOMES.objectives,
+        COLUMNS.designs,
+        COLUMNS.objectives,
     ]
     labels = [Status.FELL.label, Status.OK.label]
     assert labels == sorted(labels)
     statuses = bytes([0x82]) + encoded(labels)
     nested = b"\xd8\x28\x82\x82\x02\x01\xd8\x40\x42\x01\x00"
-    tail = [OUTCOMES.fitness, LINK.ask_digest, {"from_iteration": 0, "code": "a"}]
+    tail = [COLUMNS.fitness, LINK.ask_digest, {"from_iteration": 0, "code": "a"}]
     reevaluation = b"\x84\x00" + encoded(np.array([[1.5, 2.0]]))
     reevaluation += b"\x82" + encoded([Status.OK.label]) + b"\xd8\x28\x82\x81\x01\xd8\x40\x41\x00"
     reevaluation += encoded(np.array([2.5]))
@@ -140,8 +142,7 @@ def one_ulp(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
 
 
 def test_one_bit_of_anything_makes_another_digest() -> None:
-    assert OUTCOMES.reevaluation is not None
-    better = replace(OUTCOMES.reevaluation, fitness=math.nextafter(2.5, 0.0))
+    better = replace(REEVALUATION, fitness=math.nextafter(2.5, 0.0))
     other_status = np.array([[Status.OK], [Status.DIVERGED]], dtype=np.uint8)
     changed = [
         digest(before="c" * 64),
@@ -150,12 +151,12 @@ def test_one_bit_of_anything_makes_another_digest() -> None:
         digest(link=replace(LINK, positions=one_ulp(LINK.positions))),
         digest(link=replace(LINK, ask_digest="d" * 64)),
         digest(link=replace(LINK, ask_digest=None)),
-        digest(outcomes=replace(OUTCOMES, designs=one_ulp(OUTCOMES.designs))),
-        digest(outcomes=replace(OUTCOMES, objectives=one_ulp(OUTCOMES.objectives))),
-        digest(outcomes=replace(OUTCOMES, statuses=other_status)),
-        digest(outcomes=replace(OUTCOMES, fitness=one_ulp(OUTCOMES.fitness))),
-        digest(outcomes=replace(OUTCOMES, reevaluation=None)),
-        digest(outcomes=replace(OUTCOMES, reevaluation=better)),
+        digest(columns=replace(COLUMNS, designs=one_ulp(COLUMNS.designs))),
+        digest(columns=replace(COLUMNS, objectives=one_ulp(COLUMNS.objectives))),
+        digest(columns=replace(COLUMNS, statuses=other_status)),
+        digest(columns=replace(COLUMNS, fitness=one_ulp(COLUMNS.fitness))),
+        digest(reevaluation=None),
+        digest(reevaluation=better),
     ]
     assert len({digest(), *changed}) == 1 + len(changed)
     assert replace(DOCUMENTS, spec={"seed": 4}).digest != DOCUMENTS.digest

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.jobs.iteration import CachedOutcome
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.execution import RunContext, evaluate_uncached, run_claim
-from gaitswarm.services.optimizer.run.journal import Journal
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
+from gaitswarm.services.optimizer.run.journal import Journal, evaluate_uncached
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history
@@ -75,10 +74,10 @@ def through(evaluator: CountingEvaluator) -> Journal:
 class Knows(Store):
     """A store with given cached outcomes."""
 
-    def __init__(self, known: dict[bytes, CachedOutcome]) -> None:
+    def __init__(self, known: dict[bytes, Outcome]) -> None:
         self.cached = known
 
-    def known(self, keys: Any) -> dict[bytes, CachedOutcome]:
+    def known(self, keys: Any) -> dict[bytes, Outcome]:
         return {key: self.cached[key] for key in keys if key in self.cached}
 
 
@@ -175,7 +174,7 @@ def test_a_design_that_is_asked_for_twice_walks_once() -> None:
 def test_known_and_unknown_designs_come_in_the_order_of_the_request() -> None:
     asked = request([[0.5, 0.1], [0.2, 0.3], [0.7, 0.2]])
     keys, outcomes = keys_of(asked), walk(asked)
-    known = CachedOutcome(
+    known = Outcome(
         np.stack([outcome.objectives[1] for outcome in outcomes]),
         np.array([outcome.statuses[1] for outcome in outcomes], dtype=np.uint8),
     )
@@ -191,19 +190,20 @@ def test_an_outcome_that_lost_a_number_when_it_was_stored_is_walked_again() -> N
     asked = request([[0.5, 0.1]])
     (key,) = keys_of(asked)
     objectives = np.stack([outcome.objectives[0] for outcome in walk(asked)])
-    for damaged in (np.where(objectives == objectives[0, 0], np.nan, objectives), objectives[:1]):
-        known = CachedOutcome(damaged, np.zeros(2, dtype=np.uint8))
-        evaluator = CountingEvaluator()
-        outcomes, _ = evaluate_uncached(
-            through(evaluator), Knows({key: known}), asked, (key,), lambda: False
-        )
-        assert evaluator.walked == 1
-        assert bits(outcomes) == bits(walk(asked))
+    known = Outcome(
+        np.where(objectives == objectives[0, 0], np.nan, objectives), np.zeros(2, dtype=np.uint8)
+    )
+    evaluator = CountingEvaluator()
+    outcomes, _ = evaluate_uncached(
+        through(evaluator), Knows({key: known}), asked, (key,), lambda: False
+    )
+    assert evaluator.walked == 1
+    assert bits(outcomes) == bits(walk(asked))
 
 
 def test_a_store_that_does_not_answer_knows_nothing() -> None:
     class Gone(Knows):
-        def known(self, keys: Any) -> dict[bytes, CachedOutcome]:
+        def known(self, keys: Any) -> dict[bytes, Outcome]:
             raise StoreUnavailable("gone")
 
     asked = request([[0.5, 0.1], [0.2, 0.3]])

@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.analysis.front import (
     pareto_front,
 )
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by, objective_vectors
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES

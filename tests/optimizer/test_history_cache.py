@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.analysis.history import HistoryCache, HistoryMemory
 from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Claim, Job
 from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import ask, begun, completed

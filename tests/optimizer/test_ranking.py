@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
 from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, judge
 from gaitswarm.sim.outcome import Status

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.analysis.scenario_families import (
     families_of,
     scenario_families,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from tests.optimizer.columns import fitness_only
 
 NAMES = tuple("0123456789")

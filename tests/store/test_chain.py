@@ -15,7 +15,6 @@ from gaitswarm.services.optimizer.analysis.verification import HistoryCheck, che
 from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
-    Outcomes,
     ask_digest,
     iteration_digest,
 )
@@ -51,7 +50,7 @@ def expected(documents: ChainDocuments) -> list[str]:
     for index, done in enumerate([completed(0), completed(1, (1.5, math.inf)), completed(2)]):
         asked = ask(index)
         link = Link(index, asked.positions, ask_digest(asked.positions, asked.state))
-        before = iteration_digest(before, documents, link, Outcomes.of(done))
+        before = iteration_digest(before, documents, link, done.columns, None)
         found.append(before)
     return found
 

@@ -30,7 +30,6 @@ from gaitswarm.services.optimizer.errors import (
     InvalidRequest,
     ProvenanceChanged,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
 from gaitswarm.services.optimizer.jobs.fork import (
@@ -41,6 +40,7 @@ from gaitswarm.services.optimizer.jobs.fork import (
     changed_fields,
     forked_spec,
 )
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
 from gaitswarm.services.optimizer.jobs.spec import Spec

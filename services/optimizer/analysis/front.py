@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.analysis.utilities import (
     PreferenceOwner,
     fitness_by,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Iteration
 from gaitswarm.services.optimizer.jobs.job import Job
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.pso import PsoSettings

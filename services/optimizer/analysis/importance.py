@@ -26,8 +26,7 @@ from gaitswarm.services.optimizer.analysis.distribution import thinned
 from gaitswarm.services.optimizer.analysis.statistics import average_ranks, percentile_interval
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, objective_vectors
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.analysis.utilities import (
     objective_vectors,
     utilities,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.views import JobName, View, framed

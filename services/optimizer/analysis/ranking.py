@@ -9,8 +9,7 @@ from pydantic import Field
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
 from gaitswarm.services.optimizer.analysis.statistics import rank_correlation
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View

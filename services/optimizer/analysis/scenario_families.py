@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.analysis.statistics import (
     percentile_interval,
     rank_correlation,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Particle, View
 

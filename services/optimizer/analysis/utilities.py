@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, PREFERENCES, Preference

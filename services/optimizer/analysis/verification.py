@@ -15,14 +15,12 @@ from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
-    Outcomes,
-    StoredLink,
     ask_digest,
     iteration_digest,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import (
+    EvaluationColumns,
     Reevaluation,
     best_particle,
     fitness_summary,
@@ -75,7 +73,9 @@ class Chain:
     head: str | None = None
     places: dict[str, int] = field(default_factory=dict)
 
-    def extend(self, link: Link, outcomes: Outcomes) -> None:
+    def extend(
+        self, link: Link, columns: EvaluationColumns, reevaluation: Reevaluation | None
+    ) -> None:
         """Verify the next iteration. Raises BrokenChain."""
         index = self.iterations
         if link.iteration != index:
@@ -84,11 +84,11 @@ class Chain:
             raise BrokenChain(index, "it has no digest")
         try:
             before = self.head or self.documents.digest
-            digest = iteration_digest(before, self.documents, link, outcomes)
+            digest = iteration_digest(before, self.documents, link, columns, reevaluation)
         except _UNREADABLE as error:
             raise BrokenChain(index, f"it cannot be read: {str(error)[:200]}") from error
         if digest != link.digest:
-            raise BrokenChain(index, _why(self.spec, link, outcomes))
+            raise BrokenChain(index, _why(self.spec, link, columns))
         self.head = digest
         self.places[digest] = index
         self.iterations += 1
@@ -122,10 +122,10 @@ def check_history(store: Store, job: Job, *, head: str | None = None) -> History
     broken_at, problem, sizes = None, "", list[int]()
     try:
         summary = _Summary(job)
-        for stored, columns, reevaluation in _stored(store, job):
-            chain.extend(stored.link, Outcomes.read(columns, reevaluation))
-            _check_ask(stored)
-            summary.extend(stored, columns, reevaluation)
+        for link, columns, reevaluation in _stored(store, job):
+            chain.extend(link, columns, reevaluation)
+            _check_ask(link)
+            summary.extend(link, columns, reevaluation)
             sizes.append(len(columns))
         _check_next(store, job)
         problem = summary.problem() or (
@@ -145,14 +145,14 @@ def check_history(store: Store, job: Job, *, head: str | None = None) -> History
     )
 
 
-Stored = tuple[StoredLink, EvaluationColumns, Reevaluation | None]
+Stored = tuple[Link, EvaluationColumns, Reevaluation | None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Piece:
     """Rows of a range of iterations, as stored."""
 
-    links: dict[int, StoredLink]
+    links: dict[int, Link]
     columns: EvaluationColumns | None
     reevaluations: tuple[tuple[int, Reevaluation], ...]
 
@@ -160,24 +160,24 @@ class _Piece:
     def read(cls, store: Store, job_id: str, first: int, last: int) -> _Piece:
         """Raises one of _UNREADABLE for damaged rows."""
         return cls(
-            {stored.link.iteration: stored for stored in store.links(job_id, first, last)},
+            {link.iteration: link for link in store.links(job_id, first, last)},
             store.evaluation_columns(job_id, first, last),
             store.reevaluations(job_id, first, last),
         )
 
     def iteration(self, index: int) -> Stored:
         """Raises BrokenChain."""
-        stored = self.links.get(index)
-        if stored is None or not stored.committed:
+        link = self.links.get(index)
+        if link is None or not link.committed:
             raise BrokenChain(index, "it is missing")
         columns = None if self.columns is None else self.columns.of_iteration(index)
-        asked = np.arange(len(stored.link.positions))
+        asked = np.arange(len(link.positions))
         if columns is None or not np.array_equal(columns.particle, asked):
             raise BrokenChain(index, "its particles differ from those asked for")
         reevaluations = [entry for iteration, entry in self.reevaluations if iteration == index]
         if len(reevaluations) > 1:
             raise BrokenChain(index, "several of its designs were reevaluated")
-        return stored, columns, reevaluations[0] if reevaluations else None
+        return link, columns, reevaluations[0] if reevaluations else None
 
 
 def _stored(store: Store, job: Job) -> Iterator[Stored]:
@@ -204,17 +204,16 @@ def _one_by_one(store: Store, job_id: str, first: int, last: int) -> Iterator[St
         yield piece.iteration(index)
 
 
-def _check_ask(stored: StoredLink) -> None:
+def _check_ask(link: Link) -> None:
     """Check the search's state, while it is stored, against its digest."""
-    link = stored.link
-    if link.ask_digest is None or not (stored.state or not stored.committed):
+    if link.ask_digest is None or not (link.state or not link.committed):
         return
     try:
-        digest = ask_digest(link.positions, stored.state)
+        digest = ask_digest(link.positions, link.state)
     except _UNREADABLE:
         digest = ""
     if digest != link.ask_digest:
-        what = "the search's state" if stored.committed else "the ask or the search's state"
+        what = "the search's state" if link.committed else "the ask or the search's state"
         raise BrokenChain(link.iteration, f"{what} was changed after the ask")
 
 
@@ -224,8 +223,8 @@ def _check_next(store: Store, job: Job) -> None:
         links = store.links(job.id, index, index + 1)
     except _UNREADABLE as error:
         raise BrokenChain(index, f"it cannot be read: {str(error)[:200]}") from error
-    for stored in links:
-        _check_ask(stored)
+    for link in links:
+        _check_ask(link)
 
 
 class _Summary:
@@ -240,10 +239,10 @@ class _Summary:
         self._evaluations = 0
 
     def extend(
-        self, stored: StoredLink, columns: EvaluationColumns, reevaluation: Reevaluation | None
+        self, link: Link, columns: EvaluationColumns, reevaluation: Reevaluation | None
     ) -> None:
         """Verify the next iteration. Raises BrokenChain."""
-        index = stored.link.iteration
+        index = link.iteration
         self._evaluations += len(columns)
         if not self._readable:
             return
@@ -259,7 +258,7 @@ class _Summary:
             best = float(columns.fitness[particle])
         expected = fitness_summary(columns.fitness, best, self._best)
         for name, value in expected.items():
-            if not _same(value, stored.summary[name]):
+            if not _same(value, link.summary[name]):
                 raise BrokenChain(index, f"its {name} does not follow from its fitness")
         if best is not None and particle is not None and (self._best is None or best < self._best):
             self._place = (index, particle)
@@ -293,7 +292,7 @@ def judged(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.float64]:
         return np.ascontiguousarray(spec.judge(objectives, columns.failed).fitness)
 
 
-def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
+def _why(spec: AnySpec | None, link: Link, columns: EvaluationColumns) -> str:
     """Describe what was changed in an iteration, as far as it follows from the rest."""
     generic = (
         "its digest does not match what is stored: the ask, evaluations, provenance or digest"
@@ -304,20 +303,11 @@ def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
         return generic
     try:
         designs = spec.design_space().designs(link.positions)
-        (rows,) = np.nonzero((designs != outcomes.designs).any(axis=1))
+        (rows,) = np.nonzero((designs != columns.designs).any(axis=1))
         if len(rows):
             return f"design {rows[0]} differs from the ask"
-        index = np.full(len(designs), link.iteration)
-        columns = EvaluationColumns(
-            index,
-            np.arange(len(designs)),
-            outcomes.designs,
-            outcomes.objectives,
-            outcomes.statuses,
-            outcomes.fitness,
-        )
         fitness = judged(spec, columns).view(np.uint64)
-        (rows,) = np.nonzero(fitness != outcomes.fitness.view(np.uint64))
+        (rows,) = np.nonzero(fitness != columns.fitness.view(np.uint64))
     except Exception:  # noqa: BLE001 - damaged values may raise any error
         return generic
     if len(rows):

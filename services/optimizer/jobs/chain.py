@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import cbor2
@@ -23,8 +23,7 @@ import numpy as np
 from cbor2 import CBOREncoder, CBORTag
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, Reevaluation
 from gaitswarm.sim.outcome import Status
 
 VERSION: Final = 1
@@ -64,58 +63,28 @@ class Link:
     positions: Floats  # (n, d) asked for by the search
     ask_digest: str | None  # of the positions and the optimizer's state; None if unknown
     digest: str | None = None  # of the iteration; None before it is committed
+    committed: bool = True
+    state: Any = None  # the optimizer's, empty once cleared
+    summary: Mapping[str, Any] = field(default_factory=dict)  # by name of `SUMMARY`
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StoredLink:
-    """A stored iteration without its evaluations."""
-
-    link: Link  # the content of its digest
-    committed: bool
-    state: Any  # the optimizer's, empty once cleared
-    summary: Mapping[str, Any]  # by name of `SUMMARY`
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcomes:
-    """Results of an iteration's designs."""
-
-    designs: Floats  # (n, v)
-    objectives: Floats  # (n, K, m), NaN or infinite if missing
-    statuses: NDArray[np.uint8]  # (n, K) values of `gaitswarm.sim.outcome.Status`
-    fitness: Floats  # (n,), +inf for a failed design
-    reevaluation: Reevaluation | None  # of the best design in double precision, if any
-
-    @classmethod
-    def of(cls, done: CompletedIteration) -> Outcomes:
-        """Build from an iteration to be stored."""
-        return cls(
-            done.designs,
-            np.stack([outcome.objectives for outcome in done.outcomes], axis=1),
-            np.stack([outcome.statuses for outcome in done.outcomes], axis=1),
-            done.fitness,
-            done.reevaluation,
-        )
-
-    @classmethod
-    def read(cls, columns: EvaluationColumns, reevaluation: Reevaluation | None) -> Outcomes:
-        """Build from stored columns."""
-        stored = (columns.designs, columns.objectives, columns.statuses, columns.fitness)
-        return cls(*stored, reevaluation)
-
-
-def iteration_digest(before: str, documents: ChainDocuments, link: Link, outcomes: Outcomes) -> str:
-    reevaluation = outcomes.reevaluation
+def iteration_digest(
+    before: str,
+    documents: ChainDocuments,
+    link: Link,
+    columns: EvaluationColumns,
+    reevaluation: Reevaluation | None,
+) -> str:
     content = [
         "gaitswarm iteration",
         VERSION,
         before,
         link.iteration,
         link.positions,
-        outcomes.designs,
-        outcomes.objectives,
-        _Statuses(outcomes.statuses),
-        outcomes.fitness,
+        columns.designs,
+        columns.objectives,
+        _Statuses(columns.statuses),
+        columns.fitness,
         link.ask_digest,
         documents.provenance_of(link.iteration),
         reevaluation

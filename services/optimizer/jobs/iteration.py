@@ -10,12 +10,58 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.outcome import Outcome, Status
+
+Floats = NDArray[np.float64]
 
 SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
 """Columns of an iteration computed from its fitness."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvaluationColumns:
+    """Evaluations, one per row, ordered by iteration and particle; read-only."""
+
+    iteration: NDArray[np.int64]  # (r,) from 0
+    particle: NDArray[np.int64]  # (r,) from 0
+    designs: Floats  # (r, v) values of `Spec.design_space().names`, in the variables' units
+    # (r, K, m) raw objectives, cases and objectives in the spec's order, NaN if missing
+    objectives: Floats
+    statuses: NDArray[np.uint8]  # (r, K) values of `gaitswarm.sim.outcome.Status`
+    fitness: Floats  # (r,) by the job's own measure, minimized, +inf if a case failed
+
+    def __len__(self) -> int:
+        return len(self.fitness)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """All columns, in the order of the constructor."""
+        return (
+            self.iteration,
+            self.particle,
+            self.designs,
+            self.objectives,
+            self.statuses,
+            self.fitness,
+        )
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """(r, K): cases without a result."""
+        return np.asarray(self.statuses != Status.OK)
+
+    def rows(self, chosen: slice | NDArray[np.intp]) -> EvaluationColumns:
+        return EvaluationColumns(*(array[chosen] for array in self.arrays))  # type: ignore[arg-type]
+
+    def of_iteration(self, iteration: int) -> EvaluationColumns:
+        return self.rows(slice(*np.searchsorted(self.iteration, [iteration, iteration + 1])))
+
+    def after(self, iteration: int | None) -> EvaluationColumns:
+        """Return the rows of the iterations after one; all for None."""
+        if iteration is None:
+            return self
+        return self.rows(slice(int(np.searchsorted(self.iteration, iteration, "right")), None))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +69,7 @@ class Reevaluation:
     """A design of a single-precision search, reevaluated in double precision."""
 
     particle: int
-    objectives: NDArray[np.float64]  # (K, m) raw objectives by case, as in `Evaluation`
+    objectives: Floats  # (K, m) raw objectives by case, as in `Evaluation`
     statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
     fitness: float  # minimized, +inf if any case failed
 
@@ -34,9 +80,9 @@ class Evaluation:
 
     iteration: int
     particle: int
-    design: NDArray[np.float64]  # (v,) values of `Job.spec.design_space().names`
+    design: Floats  # (v,) values of `Job.spec.design_space().names`
     # (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN if missing
-    objectives: NDArray[np.float64]
+    objectives: Floats
     statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
     fitness: float  # minimized, +inf if any case failed
     # for a job's best design if the search uses single precision
@@ -70,7 +116,7 @@ class Ask:
     """
 
     iteration: int
-    positions: NDArray[np.float64]  # (particles, d) in the variables' units
+    positions: Floats  # (particles, d) in the variables' units
     state: dict[str, Any]  # the optimizer's dump after the ask
 
 
@@ -80,14 +126,6 @@ class Answered:
 
     ask: Ask
     columns: EvaluationColumns
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CachedOutcome:
-    """A design's results in all cases of some job."""
-
-    objectives: NDArray[np.float64]  # (K, m) raw objectives by case, NaN if missing
-    statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,9 +142,9 @@ class CompletedIteration:
     """All that one transaction commits of an iteration."""
 
     iteration: int
-    designs: NDArray[np.float64]  # (n, v) values of `Job.spec.design_space().names`
+    designs: Floats  # (n, v) values of `Job.spec.design_space().names`
     outcomes: tuple[Outcome, ...]  # K, one per case, of n designs each
-    fitness: NDArray[np.float64]  # (n,), +inf for a failed design
+    fitness: Floats  # (n,), +inf for a failed design
     evaluate_seconds: float  # duration of the evaluation [s]
     precision: Precision = "double"
     # of the best design, if the search uses single precision and no earlier design is as good
@@ -115,6 +153,18 @@ class CompletedIteration:
     # is not cached
     keys: tuple[bytes | None, ...] = ()
     evaluated_on: str | None = None  # where it was simulated, for people; None if unknown
+
+    @property
+    def columns(self) -> EvaluationColumns:
+        """The designs as they are stored."""
+        return EvaluationColumns(
+            np.full(len(self.fitness), self.iteration),
+            np.arange(len(self.fitness)),
+            self.designs,
+            np.stack([outcome.objectives for outcome in self.outcomes], axis=1),
+            np.stack([outcome.statuses for outcome in self.outcomes], axis=1),
+            self.fitness,
+        )
 
     @property
     def saved(self) -> int:
@@ -135,14 +185,14 @@ class CompletedIteration:
         )
 
 
-def best_particle(fitness: NDArray[np.float64]) -> int | None:
+def best_particle(fitness: Floats) -> int | None:
     """Return the index of the least finite fitness."""
     finite = np.isfinite(fitness)
     return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None
 
 
 def fitness_summary(
-    fitness: NDArray[np.float64], best: float | None, best_before: float | None
+    fitness: Floats, best: float | None, best_before: float | None
 ) -> dict[str, Any]:
     """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none."""
     finite = fitness[np.isfinite(fitness)]

@@ -9,12 +9,10 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, TypeVar
-
-import numpy as np
 
 from gaitswarm.services.optimizer.errors import (
     BudgetChanged,
@@ -26,7 +24,7 @@ from gaitswarm.services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from gaitswarm.services.optimizer.jobs.iteration import Ask, CachedOutcome, CompletedIteration
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.priority import weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -63,82 +61,13 @@ from gaitswarm.services.optimizer.run.evaluator import (
     place_of,
 )
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
-from gaitswarm.services.optimizer.run.journal import JOURNAL_SECONDS, Journal
+from gaitswarm.services.optimizer.run.journal import JOURNAL_SECONDS, Journal, evaluate_uncached
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from gaitswarm.sim.outcome import Outcome, Status
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
 
-_CACHED: Final = -1
-
-Keys = tuple[bytes | None, ...]
-
 _log = logging.getLogger(__name__)
-
-
-def evaluate_uncached(
-    journal: Journal,
-    store: Store | None,
-    request: EvaluationRequest,
-    keys: Sequence[bytes],
-    should_stop: Callable[[], bool],
-) -> tuple[tuple[Outcome, ...], Keys]:
-    """Evaluate a request without its cached and duplicate designs.
-
-    The outcomes equal those of a full evaluation, bit for bit, because an outcome depends on design
-    and case alone. An unavailable store has nothing cached.
-    """
-    if store is None or not keys:
-        return journal.evaluate(request, keys, should_stop), tuple(keys)
-    first = {key: index for index, key in reversed(list(enumerate(keys)))}
-    cached = _cached(store, request, tuple(first))
-    new = sorted(index for key, index in first.items() if key not in cached)
-    if len(new) == len(keys):
-        return journal.evaluate(request, keys, should_stop), tuple(keys)
-    evaluated: tuple[Outcome, ...] | None = None
-    if new:
-        part = replace(request, designs=request.designs[new])
-        evaluated = journal.evaluate(part, [keys[index] for index in new], should_stop)
-    row_of = {index: row for row, index in enumerate(new)}
-    rows = np.array([row_of.get(first[key], _CACHED) for key in keys])
-    outcomes = []
-    for number, case in enumerate(request.cases):
-        objectives = np.empty((len(keys), len(case.objectives)))
-        statuses = np.empty(len(keys), dtype=np.uint8)
-        if evaluated is not None:
-            here = rows != _CACHED
-            objectives[here] = evaluated[number].objectives[rows[here]]
-            statuses[here] = evaluated[number].statuses[rows[here]]
-        for index in np.flatnonzero(rows == _CACHED).tolist():
-            outcome = cached[keys[index]]
-            objectives[index] = outcome.objectives[number]
-            statuses[index] = outcome.statuses[number]
-        outcomes.append(Outcome(objectives, statuses))
-    return tuple(outcomes), tuple(key if i in row_of else None for i, key in enumerate(keys))
-
-
-def _cached(
-    store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]
-) -> dict[bytes, CachedOutcome]:
-    try:
-        stored = store.known(keys)
-    except StoreUnavailable as error:
-        _log.warning("job %s: simulating all designs without the cache: %s", request.job_id, error)
-        return {}
-    widths = {len(case.objectives) for case in request.cases}
-    shapes = {(len(request.cases), width) for width in widths}
-    return {
-        key: outcome
-        for key, outcome in stored.items()
-        if outcome.objectives.shape in shapes and _complete(outcome)
-    }
-
-
-def _complete(outcome: CachedOutcome) -> bool:
-    """False if a number was stored as null, as infinities are."""
-    ok = outcome.statuses == Status.OK
-    return bool(np.isfinite(outcome.objectives[ok]).all())
 
 
 OnCommit = Callable[[CompletedIteration, JobState], None]

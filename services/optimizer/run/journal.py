@@ -1,26 +1,76 @@
-"""The journal: outcomes of a long iteration, stored while the rest of it is evaluated"""
+"""Evaluation without what is stored: outcomes of other jobs, and the journal of a long iteration"""
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import JournalEntry
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator
-from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.outcome import Outcome, Status
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
 
 JOURNAL_SECONDS: Final = 10.0
 """Iterations that take longer, as the previous one did or as this one does, are journaled [s]."""
+
+
+_log = logging.getLogger(__name__)
+
+
+def evaluate_uncached(
+    journal: Journal,
+    store: Store | None,
+    request: EvaluationRequest,
+    keys: Sequence[bytes],
+    should_stop: Callable[[], bool],
+) -> tuple[tuple[Outcome, ...], tuple[bytes | None, ...]]:
+    """Evaluate a request without its cached and duplicate designs.
+
+    The outcomes equal those of a full evaluation, bit for bit, because an outcome depends on design
+    and case alone. An unavailable store has nothing cached.
+    """
+    if store is None or not keys:
+        return journal.evaluate(request, keys, should_stop), tuple(keys)
+    first = {key: index for index, key in reversed(list(enumerate(keys)))}
+    cached = _cached(store, request, tuple(first))
+    chosen = sorted(first.values())
+    part = replace(request, designs=request.designs[chosen])
+    found = journal.evaluate(part, [keys[index] for index in chosen], should_stop, cached)
+    place = {keys[index]: row for row, index in enumerate(chosen)}
+    rows = [place[key] for key in keys]
+    outcomes = tuple(Outcome(each.objectives[rows], each.statuses[rows]) for each in found)
+    new = [key not in cached and first[key] == index for index, key in enumerate(keys)]
+    return outcomes, tuple(key if is_new else None for key, is_new in zip(keys, new, strict=True))
+
+
+def _cached(
+    store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]
+) -> dict[bytes, Outcome]:
+    try:
+        stored = store.known(keys)
+    except StoreUnavailable as error:
+        _log.warning("job %s: simulating all designs without the cache: %s", request.job_id, error)
+        return {}
+    shapes = {(len(request.cases), len(case.objectives)) for case in request.cases}
+    return {
+        key: outcome
+        for key, outcome in stored.items()
+        # Infinities are stored as null.
+        if outcome.objectives.shape in shapes
+        and np.isfinite(outcome.objectives[outcome.statuses == Status.OK]).all()
+    }
 
 
 class Journal:
@@ -53,17 +103,28 @@ class Journal:
         self._writing = threading.Lock()
 
     def evaluate(
-        self, request: EvaluationRequest, keys: Sequence[bytes], should_stop: Callable[[], bool]
+        self,
+        request: EvaluationRequest,
+        keys: Sequence[bytes],
+        should_stop: Callable[[], bool],
+        cached: Mapping[bytes, Outcome] = MappingProxyType({}),
     ) -> tuple[Outcome, ...]:
-        """Evaluate as `Evaluator.evaluate`; designs are identified by their keys."""
+        """Evaluate as `Evaluator.evaluate`; designs are identified by their keys.
+
+        cached: outcomes of designs, a row for each case.
+        """
         if not keys:
             return self._evaluator.evaluate(request, should_stop)
         if self._begun is None:
             self._begun = self._clock()
         numbers, count = range(len(request.cases)), len(keys)
-        if not self._known:
+        known = self._known | {
+            (number, key): (outcome.objectives[number], int(outcome.statuses[number]))
+            for key, outcome in cached.items()
+            for number in numbers
+        }
+        if not known:
             return self._run(request, numbers, keys, should_stop)
-        known = self._known
         missing = np.array([[(number, key) not in known for number in numbers] for key in keys])
         outcomes = [
             Outcome(np.empty((count, len(case.objectives))), np.empty(count, dtype=np.uint8))

@@ -37,20 +37,17 @@ from gaitswarm.services.optimizer.errors import Conflict, NotFound
 from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
-    Outcomes,
-    StoredLink,
     ask_digest,
     iteration_digest,
 )
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.fork import Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.iteration import (
     SUMMARY,
     Answered,
     Ask,
-    CachedOutcome,
     CompletedIteration,
     Evaluation,
+    EvaluationColumns,
     Iteration,
     JournalEntry,
     Reevaluation,
@@ -196,13 +193,13 @@ class History(Aggregate):
             require_job(connection, job_id)
             return _select_reevaluations(connection, job_id, first, last)
 
-    def known(self, keys: Sequence[bytes]) -> dict[bytes, CachedOutcome]:
-        """Return the outcomes of designs that any job has simulated, by key.
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, Outcome]:
+        """Return the outcomes of designs that any job has simulated, by key; a row for each case.
 
         Args:
             keys: from `walk_keys`.
         """
-        table, outcomes = evaluations.c, dict[bytes, CachedOutcome]()
+        table, outcomes = evaluations.c, dict[bytes, Outcome]()
         columns = (table.walk_key, cast(table.objectives, Text), cast(table.statuses, Text))
         with self._database.read("known") as connection:
             for first in range(0, len(keys), _KEYS_AT_ONCE):
@@ -212,7 +209,7 @@ class History(Aggregate):
                     with suppress(ValueError, TypeError, KeyError):
                         numbers = np.array(_JSON.validate_json(objectives), dtype=np.float64)
                         values = np.array(_statuses(statuses), dtype=np.uint8)
-                        outcomes[key] = CachedOutcome(numbers, values)
+                        outcomes[key] = Outcome(numbers, values)
         return outcomes
 
     def chain_documents(self, job_id: str) -> ChainDocuments:
@@ -220,7 +217,7 @@ class History(Aggregate):
         with self._database.read("chain_documents") as connection:
             return chain_documents(job_row(connection, job_id))
 
-    def links(self, job_id: str, first: int, last: int) -> tuple[StoredLink, ...]:
+    def links(self, job_id: str, first: int, last: int) -> tuple[Link, ...]:
         """Return a range of iterations, including the current one, without evaluations.
 
         Raises:
@@ -301,19 +298,15 @@ def _select_reevaluations(
     )
 
 
-def _select_links(
-    connection: Connection, job_id: str, first: int, last: int
-) -> tuple[StoredLink, ...]:
+def _select_links(connection: Connection, job_id: str, first: int, last: int) -> tuple[Link, ...]:
     query = select(iterations).where(*_between(iterations, job_id, first, last))
     rows = connection.execute(query.order_by(iterations.c.iteration)).mappings()
     return tuple(
-        StoredLink(
-            Link(
-                row["iteration"],
-                np.array(row["positions"], dtype=np.float64),
-                row["ask_digest"],
-                row["digest"],
-            ),
+        Link(
+            row["iteration"],
+            np.array(row["positions"], dtype=np.float64),
+            row["ask_digest"],
+            row["digest"],
             row["committed_at"] is not None,
             row["optimizer_state"],
             {name: row[name] for name in SUMMARY},
@@ -406,7 +399,8 @@ def complete_iteration(
     documents = chain_documents(job)
     link = Link(done.iteration, np.array(row.positions, dtype=np.float64), row.ask_digest)
     before = job["head"] or documents.digest
-    digest = iteration_digest(before, documents, link, Outcomes.of(done))
+    columns = done.columns
+    digest = iteration_digest(before, documents, link, columns, done.reevaluation)
     best = None if done.best is None else done.best[1]
     connection.execute(
         update(iterations)
@@ -420,7 +414,8 @@ def complete_iteration(
     )
     previous = _at(job["id"], done.iteration - 1)
     connection.execute(update(iterations).where(previous).values(optimizer_state={}))
-    connection.execute(insert(evaluations), _evaluation_rows(job["id"], done))
+    keys = done.keys or [None] * len(columns)
+    connection.execute(insert(evaluations), _evaluation_rows(job["id"], columns, keys))
     if done.reevaluation is not None:
         again = done.reevaluation
         results = _result_columns(again.objectives.tolist(), again.statuses.tolist(), again.fitness)
@@ -429,22 +424,20 @@ def complete_iteration(
     return digest
 
 
-def _evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any]]:
-    # (K, n, m) and (K, n), by case, become (n, K, m) and (n, K).
-    objectives = np.stack([outcome.objectives for outcome in done.outcomes], axis=1)
-    statuses = np.stack([outcome.statuses for outcome in done.outcomes], axis=1)
-    columns = (done.designs, objectives, statuses, done.fitness)
-    rows = zip(*(c.tolist() for c in columns), done.keys or [None] * len(objectives), strict=True)
+def _evaluation_rows(
+    job_id: str, columns: EvaluationColumns, keys: Sequence[bytes | None]
+) -> list[dict[str, Any]]:
+    rows: Any = zip(*(array.tolist() for array in columns.arrays), keys, strict=True)
     return [
         {
             "job_id": job_id,
-            "iteration": done.iteration,
+            "iteration": iteration,
             "particle": particle,
             "design": design,
             "walk_key": key,
-            **_result_columns(by_case, labels, fitness),
+            **_result_columns(objectives, statuses, fitness),
         }
-        for particle, (design, by_case, labels, fitness, key) in enumerate(rows)
+        for iteration, particle, design, objectives, statuses, fitness, key in rows
     ]
 
 
@@ -574,11 +567,11 @@ def chain_iterations(
         rows = []
         columns = _select_columns(connection, job_id, first, last)
         reevaluated = dict(_select_reevaluations(connection, job_id, first, last))
-        for stored in _select_links(connection, job_id, first, last):
-            index = stored.link.iteration
+        for link in _select_links(connection, job_id, first, last):
+            index = link.iteration
             assert columns is not None  # noqa: S101 - every iteration has designs
-            outcomes = Outcomes.read(columns.of_iteration(index), reevaluated.get(index))
-            digest = iteration_digest(digest, documents, stored.link, outcomes)
+            of_link = columns.of_iteration(index)
+            digest = iteration_digest(digest, documents, link, of_link, reevaluated.get(index))
             rows.append({"at": index, "chained": digest})
         connection.execute(chained, rows)
     return digest

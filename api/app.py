@@ -18,7 +18,6 @@ from gaitswarm.api.documentation import ASSETS, DESCRIPTION, TAGS, add_documenta
 from gaitswarm.api.middleware import BodyLimitMiddleware, OriginMiddleware, ResponseMiddleware
 from gaitswarm.api.page import MANUAL_FOLDER, PAGE_FOLDER, add_manual, add_page
 from gaitswarm.api.problems import add_problem_handlers
-from gaitswarm.operations import record_measured_walk
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.collectors import QueueCollector
 from gaitswarm.services.monitoring.metrics import Metrics
@@ -77,7 +76,7 @@ def create_app(
     app.add_middleware(
         BodyLimitMiddleware,
         max_bytes=settings.api_max_body_bytes,
-        larger={PREFIX + record_measured_walk.path: settings.api_max_log_bytes},
+        larger={f"{PREFIX}/measured-walks": settings.api_max_log_bytes},
     )
     app.add_middleware(
         GZipMiddleware,

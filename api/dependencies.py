@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 from typing import Annotated, Any, Final, TypedDict, TypeVar, cast
 
 from anyio import CapacityLimiter
@@ -14,7 +13,7 @@ from anyio.to_thread import run_sync
 from fastapi import Depends, FastAPI, Path, Request
 
 from gaitswarm.api.events import Topics
-from gaitswarm.operations import JobIdText, Limits
+from gaitswarm.jobs.operation import JobIdText
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
@@ -23,9 +22,6 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
 
 T = TypeVar("T")
-
-MOST_RANKED: Final = 20_000_000
-"""Evaluations times preferences of one request, which take some seconds."""
 
 _VALIDATIONS: Final = 2
 """Bodies validated at the same time; more threads would starve the event loop of the GIL."""
@@ -130,29 +126,10 @@ def _state(name: str) -> Any:
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, _state("settings")]
 Computing = Annotated[ComputingCapacity, _state("computing")]
-JobActivities = Annotated[Activity | None, _state("activity")]
 Stopping = Annotated[asyncio.Event, _state("stopping")]
 FollowedJobs = Annotated[Topics, _state("topics")]
 ServerMetrics = Annotated[Metrics, _state("metrics")]
 
-
-async def limits(settings: ServerSettings) -> Limits:
-    """Return the limits of one request."""
-    return Limits(
-        simulated=settings.api_max_simulated_seconds,
-        logged=settings.api_max_logged_seconds,
-        sampled=settings.api_max_sampled_seconds,
-        ranked=MOST_RANKED,
-    )
-
-
-async def robot_folders(settings: ServerSettings) -> Sequence[FilePath]:
-    """Return the folders in which to look for meshes."""
-    return settings.robots
-
-
-ServerLimits = Annotated[Limits, Depends(limits)]
-RobotFolders = Annotated[Sequence[FilePath], Depends(robot_folders)]
 
 JobId = Annotated[JobIdText, Path(description="Id of the job, as POST /v1/jobs returned it.")]
 

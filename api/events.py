@@ -8,15 +8,16 @@ from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import anyio
 from anyio.to_thread import run_sync
 from fastapi.responses import StreamingResponse
 from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
+from pydantic import BaseModel, Field
 from starlette.types import Receive, Scope, Send
 
-from gaitswarm.operations import LARGEST_INDEX, EventsQuery
+from gaitswarm.jobs.operation import LARGEST_INDEX, AfterIteration
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
@@ -39,7 +40,7 @@ _RECONNECT: Final = 1000
 
 _REVOKED: Final = format_sse_event(comment="the token was revoked")
 
-EXAMPLE: Final = """\
+_EXAMPLE: Final = """\
 event: iteration
 data: {"index":24,"designs":25,"best":21.3,"mean":25.2,"median":23.9,"worst":41.7,\
 "best_so_far":20.9,"failed":2,"evaluate_seconds":1.23,"committed_at":"2026-01-01T12:00:00Z"}
@@ -51,7 +52,7 @@ data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"eva
 
 """
 
-EVENT_SCHEMA: Final = {
+_SCHEMA: Final = {
     "type": "object",
     "properties": {
         "data": {"type": "string"},
@@ -62,10 +63,30 @@ EVENT_SCHEMA: Final = {
 }
 """Schema of one event (OpenAPI 3.2)."""
 
+EVENTS: Final[dict[int | str, Any]] = {
+    200: {"content": {"text/event-stream": {"example": _EXAMPLE, "itemSchema": _SCHEMA}}}
+}
+"""Documentation of a stream."""
+
 _HEADERS: Final = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 
 _LONGEST_WAIT: Final = 60.0
 """Time after which a job is read again without a notification [s]."""
+
+
+class EventsQuery(BaseModel):
+    """Where a stream of events begins and ends."""
+
+    after: AfterIteration = None
+    follow: bool = Field(
+        default=True, description="False: end the stream after the committed iterations."
+    )
+    limit: int | None = Field(
+        default=None,
+        ge=1,
+        le=LARGEST_INDEX,
+        description="End the stream after this many iterations.",
+    )
 
 
 @dataclass(frozen=True)

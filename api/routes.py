@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import NoneType
-from typing import Annotated, Any, Final, TypeVar, get_args
+from typing import Annotated, Any, Final, get_args
 
 from anyio.to_thread import run_sync
 from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Response, status
@@ -18,7 +18,6 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, StreamingResponse
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
-from gaitswarm import operations
 from gaitswarm.api.access import (
     Actor,
     NewPriority,
@@ -32,20 +31,20 @@ from gaitswarm.api.access import (
 )
 from gaitswarm.api.dependencies import (
     Computing,
+    ComputingCapacity,
     ExistingJob,
     FollowedJobs,
-    JobActivities,
     JobId,
-    RobotFolders,
-    ServerLimits,
     ServerMetrics,
     ServerSettings,
     Service,
     Stopping,
 )
 from gaitswarm.api.documentation import Responses, binary, problems
-from gaitswarm.api.events import EVENT_SCHEMA, EXAMPLE, EventStream, job_events
-from gaitswarm.operations import LARGEST_INDEX, OPERATIONS, Operation
+from gaitswarm.api.events import EVENTS, EventsQuery, EventStream, job_events
+from gaitswarm.jobs.base import job_view
+from gaitswarm.jobs.operation import LARGEST_INDEX, OPERATIONS, Context, Limits, Operation
+from gaitswarm.operations import ServedJobs
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Job
@@ -54,11 +53,8 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.input import with_known_keys
 from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
-from gaitswarm.tables import MEDIA_TYPES, encoded_table
 from gaitswarm.views.base import PREFIX
 from gaitswarm.views.job import JobView
-
-T = TypeVar("T")
 
 _PATH: Final[Mapping[str, Any]] = {
     "job_id": JobId,
@@ -90,16 +86,6 @@ _PATH: Final[Mapping[str, Any]] = {
 }
 """Parameters of paths."""
 
-_FILLED_IN: Final[Mapping[str, Any]] = {
-    "activities": JobActivities,
-    "actor": Actor,
-    "check_priority": PriorityCheck,
-    "folders": RobotFolders,
-    "limits": ServerLimits,
-    "quota": OwnersQuota,
-}
-"""Keyword-only arguments of operations."""
-
 _ACCESS: Final[Mapping[str, list[Any]]] = {
     "read": [],
     "submit": [Depends(may_submit)],
@@ -111,6 +97,24 @@ _IfNoneMatch = Annotated[
     str | None,
     Header(max_length=1000, description="`ETag` of cached bytes; 304 if they are unchanged."),
 ]
+
+_STATUSES: Final = {
+    "NotFound": status.HTTP_404_NOT_FOUND,
+    "Conflict": status.HTTP_409_CONFLICT,
+}
+"""Of errors that docstrings document."""
+
+_FOR_THE_PAGE: Final = "\n\nFor the web page; it may change with the page."
+
+_EARLIER: Final[Responses] = {
+    200: {
+        "model": JobView,
+        "description": "The key was used before for the same request; its job is returned.",
+    }
+}
+
+MOST_RANKED: Final = 20_000_000
+"""Evaluations times preferences of one request, which take some seconds."""
 
 MOST_NAMES: Final = 10_000
 """Fields in a body, without start designs; each may yield an error."""
@@ -182,25 +186,51 @@ def _refusal(where: Location, problem: str, document: Any) -> RequestValidationE
     return RequestValidationError([entry], body=document)
 
 
-def _endpoint(operation: Operation[Any]) -> Callable[..., Any]:
+async def request_context(
+    request: Request,
+    actor: Actor,
+    quota: OwnersQuota,
+    check_priority: PriorityCheck,
+    settings: ServerSettings,
+) -> Context:
+    """Return what the server adds to the arguments of an operation."""
+    limits = Limits(
+        simulated=settings.api_max_simulated_seconds,
+        logged=settings.api_max_logged_seconds,
+        sampled=settings.api_max_sampled_seconds,
+        ranked=MOST_RANKED,
+    )
+    activity = request.state.activity
+    return Context(actor, quota, limits, check_priority, activity, settings.robots)
+
+
+def _endpoint(operation: Operation) -> Callable[..., Any]:
     """Return the generic endpoint of an operation, with a signature for FastAPI."""
 
     async def answer(
-        service: JobService, computing: Computing, if_none_match: str | None = None, **given: Any
+        service: JobService,
+        context: Context,
+        computing: ComputingCapacity,
+        if_none_match: str | None = None,
+        request: Any = None,
+        **path: Any,
     ) -> Response:
         # Encoded in the thread: an answer may have hundreds of thousands of numbers.
-        work = partial(_response, operation, service, given, if_none_match)
+        jobs = ServedJobs(service, context)
+        work = partial(_response, operation, jobs, path, request, if_none_match)
         return await (computing.run(work) if operation.heavy else run_sync(work))
 
-    kinds: dict[str, Any] = {"service": Service, "computing": Computing}
-    for name, parameter in operation.parameters.items():
-        kind = parameter.annotation
-        if parameter is not operation.request:
-            kinds[name] = _PATH[name] if name in _PATH else _FILLED_IN[name]
-        elif operation.method == "GET":
-            kinds[name] = Annotated[kind, Query()]
-        else:
-            kinds[name] = Annotated[kind, Depends(validated(kind, name))]
+    kinds: dict[str, Any] = {
+        "service": Service,
+        "context": Annotated[Context, Depends(request_context)],
+        "computing": Computing,
+    } | {name: _PATH[name] for name in operation.path_names}
+    if operation.request is not None and operation.method == "GET":
+        kinds["request"] = Annotated[operation.request, Query()]
+    elif operation.request is not None:
+        kind = operation.request | None if operation.is_optional else operation.request
+        name = operation.names[0] if operation.is_whole else "request"
+        kinds["request"] = Annotated[kind, Depends(validated(kind, name))]
     parameters = [inspect.Parameter(name, _KIND, annotation=kind) for name, kind in kinds.items()]
     if operation.cached:
         parameters.append(
@@ -211,13 +241,15 @@ def _endpoint(operation: Operation[Any]) -> Callable[..., Any]:
 
 
 def _response(
-    operation: Operation[Any],
-    service: JobService,
-    given: Mapping[str, Any],
+    operation: Operation,
+    jobs: ServedJobs,
+    path: Mapping[str, Any],
+    request: Any,
     received_tag: str | None,
 ) -> Response:
     """Compute and encode an answer."""
-    answer = operation.answer(service, **given)
+    given = operation.arguments(path, request)
+    answer = operation.function(jobs, **given)
     headers = {}
     if operation.location is not None:
         headers["Location"] = PREFIX + operation.location(answer)
@@ -228,6 +260,9 @@ def _response(
         headers["Cache-Control"] = "no-store"
     if answer is None:
         return Response(status_code=operation.status, headers=headers)
+    if operation.media_types:
+        media_type = operation.media_types[request.format]
+        return StreamingResponse(answer, headers=headers, media_type=media_type)
     if operation.result is not bytes:
         content, media_type = operation.adapter.dump_json(answer, by_alias=True), "application/json"
         return Response(content, operation.status, headers, media_type)
@@ -239,56 +274,46 @@ def _response(
     return Response(answer, operation.status, headers, operation.media_type)
 
 
-def documented(
-    operation: Operation[Any], *, responses: Responses | None = None, **options: Any
-) -> dict[str, Any]:
-    """Return the arguments of a route: those that follow from its operation, and others."""
+def documented(operation: Operation) -> dict[str, Any]:
+    """Return the arguments of an operation's route."""
     has_body = operation.request is not None and operation.method != "GET"
-    is_refusable = operation.heavy or operation.access == "command"
+    docstring = operation.docstring
+    is_bytes = operation.result is bytes or bool(operation.media_types)
     statuses = {
-        *operation.refusals,
+        _STATUSES[name]: text for name, text in docstring.errors.items() if name in _STATUSES
+    }
+    is_refusable = operation.heavy or operation.access == "command"
+    responses = problems(
+        *statuses,
         *((400, 413) if has_body else ()),
         *((404,) if operation.path_names else ()),
         *((422,) if operation.request is not None or operation.path_names else ()),
         *((403,) if operation.access != "read" else ()),
         *((409,) if "job_id" in operation.path_names and is_refusable else ()),
-    }
-    documents = (responses or {}) | problems(*sorted(statuses))
-    if operation.content:
-        documents = binary(operation.content, operation.media_type) | documents
+    )
+    for code, text in statuses.items():
+        responses[code]["description"] = f"{text} {responses[code]['description']}"
+    if is_bytes:
+        media_types = operation.media_types.values() or [operation.media_type]
+        responses |= binary(docstring.result, *media_types)
     if operation.cached:
-        documents[status.HTTP_304_NOT_MODIFIED] = {"description": "`If-None-Match` has the ETag."}
-    description = inspect.cleandoc(operation.answer.__doc__ or "")
-    if operation.page:
-        description += "\n\nFor the web page; it may change with the page."
+        responses[status.HTTP_304_NOT_MODIFIED] = {"description": "`If-None-Match` has the ETag."}
+    has_model = not is_bytes and operation.result is not NoneType
     return {
         "path": PREFIX + operation.path,
         "methods": [operation.method],
         "operation_id": operation.id,
         "summary": operation.summary,
-        "description": description,
+        "description": docstring.text + (_FOR_THE_PAGE if operation.page else ""),
+        "response_description": docstring.result or "Successful Response",
         "tags": [operation.tag],
         "status_code": operation.status,
         "dependencies": _ACCESS[operation.access],
-        "responses": documents,
-        "response_model": None if operation.result in (bytes, NoneType) else operation.result,
-        "response_class": Response if operation.result in (bytes, NoneType) else JSONResponse,
+        "responses": responses,
+        "response_model": operation.result if has_model else None,
+        "response_class": JSONResponse if has_model else Response,
         "openapi_extra": {"x-used-by": "page"} if operation.page else None,
-        **options,
     }
-
-
-_BY_HAND: Final[dict[str, tuple[Callable[..., Any], dict[str, Any]]]] = {}
-
-
-def by_hand(operation: Operation[Any], **options: Any) -> Callable[[T], T]:
-    """Serve an operation by the decorated endpoint."""
-
-    def add(endpoint: Any) -> Any:
-        _BY_HAND[operation.id] = endpoint, options
-        return endpoint
-
-    return add
 
 
 IdempotencyKey = Annotated[
@@ -355,26 +380,26 @@ Submission = Annotated[dict[str, Any], Depends(submission)]
 SentDocument = Annotated[Any, Depends(request_document)]
 
 
-def _queued(what: str) -> dict[str, Any]:
-    return {
-        "response_description": "The job is queued; `Location` is its path.",
-        "responses": {
-            200: {
-                "model": JobView,
-                "description": f"The key was used before for the same {what}, which is returned.",
-            }
-        },
-    }
-
-
-def _submitted(service: JobService, response: Response, job: Job, new: bool) -> JobView:
-    if not new:
+def _job_view(service: JobService, response: Response, job: Job, is_new: bool) -> JobView:
+    if not is_new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
-    return operations.full_view(service, job)
+    return job_view(service, job)
 
 
-@by_hand(operations.submit_job, **_queued("job"))
+router: Final = APIRouter()
+
+
+@router.post(
+    f"{PREFIX}/jobs",
+    operation_id="submit_job",
+    summary="Submit a job",
+    tags=["core"],
+    status_code=status.HTTP_202_ACCEPTED,
+    dependencies=_ACCESS["submit"],
+    response_description="The job is queued; `Location` is its path.",
+    responses=_EARLIER | problems(400, 403, 409, 413, 422),
+)
 def submit_job(
     spec: Annotated[AnySpec, Depends(validated(AnySpec, "spec"))],
     service: Service,
@@ -382,10 +407,25 @@ def submit_job(
     submission: Submission,
     sent: SentDocument,
 ) -> JobView:
-    return _submitted(service, response, *service.submit(spec, request=sent, **submission))
+    """Check that the job can be simulated and queue it.
+
+    Returns at once; a runner starts the job when it has capacity. With an `Idempotency-Key` that
+    was used before, the same body returns the existing job with 200, even if presets have changed
+    since; a body for another job returns 409.
+    """
+    return _job_view(service, response, *service.submit(spec, request=sent, **submission))
 
 
-@by_hand(operations.fork_job, **_queued("fork"))
+@router.post(
+    f"{PREFIX}/jobs/{{job_id}}/fork",
+    operation_id="fork_job",
+    summary="Fork a job",
+    tags=["operations"],
+    status_code=status.HTTP_202_ACCEPTED,
+    dependencies=_ACCESS["submit"],
+    response_description="The job is queued; `Location` is its path.",
+    responses=_EARLIER | problems(400, 403, 404, 409, 413, 422),
+)
 async def fork_job(
     fork: Annotated[ForkRequest, Depends(validated(ForkRequest, "fork"))],
     job_id: JobId,
@@ -395,37 +435,31 @@ async def fork_job(
     submission: Submission,
     sent: SentDocument,
 ) -> JobView:
+    """Queue a job that starts from iterations of this one, which stays unchanged.
+
+    With the same settings the fork continues bit for bit. Under another preference the stored
+    objectives are judged again and passed to the search if its method supports that; otherwise, and
+    with another optimizer, robot or other scenarios, a new search starts from the best designs. The
+    fork's `lineage` says which, and why. 409 if the search cannot be continued, or if its
+    provenance has changed and the request does not accept that.
+    """
+
     def work() -> JobView:
-        return _submitted(service, response, *service.fork(job_id, fork, sent=sent, **submission))
+        return _job_view(service, response, *service.fork(job_id, fork, sent=sent, **submission))
 
     return await computing.run(work)
 
 
-@by_hand(
-    operations.export_job,
-    response_class=StreamingResponse,
-    response_model=None,
-    responses=binary("The table, as a file.", *MEDIA_TYPES.values()),
-)
-def export_job(
-    job: ExistingJob, service: Service, query: Annotated[operations.ExportQuery, Query()]
-) -> StreamingResponse:
-    return StreamingResponse(
-        encoded_table(query.format, job.spec, service.column_pieces(job)),
-        media_type=MEDIA_TYPES[query.format],
-        headers={"Content-Disposition": f'attachment; filename="{job.id}.{query.format}"'},
-    )
-
-
-@by_hand(
-    operations.stream_events,
+@router.get(
+    f"{PREFIX}/jobs/{{job_id}}/events",
+    operation_id="stream_events",
+    summary="Follow a job",
+    tags=["core"],
     # The schema of EventStream would be a string.
     response_class=StreamingResponse,
     response_model=None,
     response_description="Server-sent events `iteration`, `state` and `deleted`.",
-    responses={
-        200: {"content": {"text/event-stream": {"example": EXAMPLE, "itemSchema": EVENT_SCHEMA}}}
-    },
+    responses=EVENTS | problems(404, 422),
 )
 async def stream_events(
     job: ExistingJob,
@@ -435,7 +469,7 @@ async def stream_events(
     stopping: Stopping,
     metrics: ServerMetrics,
     until_revoked: UntilRevoked,
-    query: Annotated[operations.EventsQuery, Query()],
+    query: Annotated[EventsQuery, Query()],
     last_event_id: Annotated[
         int | None,
         Header(
@@ -447,6 +481,16 @@ async def stream_events(
         ),
     ] = None,
 ) -> EventStream:
+    """Stream committed iterations as server-sent events.
+
+    An event `iteration` is sent once for each committed iteration, in order; its id is the
+    iteration's index, its data an IterationView. An event `state`, without an id, is sent on
+    connecting and whenever the job's state or its reason to wait changes; its data is a StateView.
+    The stream ends after the event of a final state. A broken stream continues without gap or
+    repetition from `Last-Event-ID` (or `after`). Comments keep idle connections alive. The stream
+    of a deleted job ends with an event `deleted`, whose data has its `id`. A stopping server sends
+    a comment and the field `retry`. With a revoked token the stream ends within seconds.
+    """
     if last_event_id is not None:
         query = query.model_copy(update={"after": last_event_id})
     seconds = settings.api_event_poll_seconds
@@ -455,12 +499,5 @@ async def stream_events(
     return EventStream(events, until_revoked)
 
 
-def _router() -> APIRouter:
-    router = APIRouter()
-    for operation in OPERATIONS:
-        endpoint, options = _BY_HAND.get(operation.id) or (_endpoint(operation), {})
-        router.add_api_route(endpoint=endpoint, **documented(operation, **options))
-    return router
-
-
-router: Final = _router()
+for _operation in OPERATIONS:
+    router.add_api_route(endpoint=_endpoint(_operation), **documented(_operation))

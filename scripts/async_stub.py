@@ -41,7 +41,7 @@ def stub() -> str:
     names = {node.id for node in ast.walk(ast.parse(body)) if isinstance(node, ast.Name)}
     imports = _imports(base) | _imports(database)
     imports |= {"AsyncIterator": "collections.abc", "Jobs": "gaitswarm.jobs.base"}
-    imports["JobEvent"] = "gaitswarm.jobs.base"
+    imports |= {"JobEvent": "gaitswarm.jobs.base", "Runs": "gaitswarm.jobs.base"}
     modules = defaultdict(list)
     for name in sorted(names & imports.keys()):
         modules[imports[name]].append(name)
@@ -49,8 +49,18 @@ def stub() -> str:
     return "\n".join(["import os", *sorted(lines), body])
 
 
+class _Plain(ast.NodeTransformer):
+    """Drops limits of arguments: Annotated[int, Field(ge=0)] -> int."""
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        if isinstance(node.slice, ast.Tuple) and ast.unparse(node.value) == "Annotated":
+            return node.slice.elts[0]
+        return self.generic_visit(node)
+
+
 def _module(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    module: ast.Module = _Plain().visit(ast.parse(path.read_text(encoding="utf-8")))
+    return module
 
 
 def _indented(begin: str, *lines: str) -> str:
@@ -61,7 +71,7 @@ def _imports(module: ast.Module) -> dict[str, str]:
     """Return the module of every imported name."""
     return {
         alias.name: str(node.module)
-        for node in module.body
+        for node in ast.walk(module)
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 
 import typer
 
@@ -420,7 +420,7 @@ def synthesize(
 
 
 LeaveOneOut = Annotated[
-    str | None,
+    Literal["target", "walk"] | None,
     typer.Option(
         metavar="target|walk",
         help="Predict every target by the best design without it, or without its walk; without"
@@ -473,10 +473,7 @@ def calibrate(
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs.spec_file import parse_spec
     from gaitswarm.cli.inputs.targets_file import read_targets
-    from gaitswarm.operations import TargetsQuery
-    from gaitswarm.specs import checked
 
-    checked(TargetsQuery, {"leave_out": leave_one_out})
     document: dict[str, Any] = {
         "kind": "calibration",
         "name": name or f"calibration to {table.name}",
@@ -518,13 +515,9 @@ def targets(
 
 
 def _targets(
-    jobs: Jobs, job_ids: list[str], leave_one_out: str | None
+    jobs: Jobs, job_ids: list[str], leave_one_out: Literal["target", "walk"] | None
 ) -> tuple[dict[str, Any], Parts]:
-    from gaitswarm.operations import TargetsQuery
-    from gaitswarm.specs import checked
-
-    query = checked(TargetsQuery, {"leave_out": leave_one_out})
-    reached = jobs.targets(job_ids, leave_out=query.leave_out)
+    reached = jobs.targets(job_ids, leave_out=leave_one_out)
     parameters = jobs.parameters(job_ids)
     return {"targets": reached, "parameters": parameters}, _calibrated(reached, parameters)
 

@@ -11,46 +11,71 @@ from dataclasses import asdict
 from functools import partial
 from itertools import islice
 from types import TracebackType
-from typing import Any, Final, Self, TypeAlias, TypeVar, Unpack
+from typing import Annotated, Any, Final, Self, TypeAlias, TypeVar, Unpack
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from gaitswarm import operations
-from gaitswarm.errors import InvalidRequest
+from gaitswarm.designs import SimulationRequest, resolved
+from gaitswarm.errors import InvalidRequest, NotFound
 from gaitswarm.firmware import (
     FirmwareOptions,
     FirmwareRequest,
     FirmwareView,
     firmware_request_of_best,
+    firmware_view,
+    run_firmware,
 )
-from gaitswarm.operations import Operation
+from gaitswarm.jobs.operation import (
+    After,
+    AfterIteration,
+    Context,
+    Index,
+    JobIdText,
+    Operation,
+    PageLimit,
+    SearchText,
+    analysis,
+    core,
+    operations,
+    robots,
+)
 from gaitswarm.recordings import RecordingEntryView, RecordingView
-from gaitswarm.replay import WalkReplay, decoded_replay
-from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
-from gaitswarm.services.optimizer.analysis.certificate import CertificateView
-from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
+from gaitswarm.replay import ReplayRequest, WalkReplay, decoded_replay, run_replay
+from gaitswarm.robustness_index import (
+    RobustnessOptions,
+    RobustnessRequest,
+    RobustnessView,
+    run_robustness,
+    sampled_indices,
+)
+from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST, CertificateView
+from gaitswarm.services.optimizer.analysis.comparison import MOST_JOBS, JobComparisonView
+from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
 from gaitswarm.services.optimizer.analysis.failures import FailuresView
-from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
 from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
+    PreferencesRequest,
     RobustPreferencesView,
 )
-from gaitswarm.services.optimizer.analysis.ranking import RankingView
-from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView
+from gaitswarm.services.optimizer.analysis.scenario_families import TOLERANCE, ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
-from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.jobs.job import LARGEST_BUDGET, Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
-from gaitswarm.services.optimizer.jobs.priority import check_priority
+from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST, check_priority
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
-from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.simulation import SimulationResult
+from gaitswarm.simulation import SimulationResult, SimulationView, run_simulation
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
@@ -62,12 +87,14 @@ from gaitswarm.specs import (
     chosen_spec,
     laid_options,
 )
-from gaitswarm.surface import SurfaceView
-from gaitswarm.tables import EvaluationTable, TableFormat
+from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
+from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, encoded_table
+from gaitswarm.views.catalogue import CatalogueView
 from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
-from gaitswarm.views.job import EstimateView, JobSummaryView, JobView, StateView
-from gaitswarm.views.verification import HistoryVerificationView
-from gaitswarm.zip_archive import unzipped
+from gaitswarm.views.job import EstimateView, JobKind, JobSummaryView, JobView, StateView
+from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
+from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
+from gaitswarm.zip_archive import unzipped, zipped
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
@@ -78,11 +105,11 @@ PAGE: Final = 100
 JobEvent: TypeAlias = IterationView | StateView
 """An iteration was committed, or the state of a job changed."""
 
-_COMMANDS: Final[Mapping[Command, Operation[JobView]]] = {
-    Command.PAUSE: operations.pause_job,
-    Command.RESUME: operations.resume_job,
-    Command.CANCEL: operations.cancel_job,
-}
+Runs: TypeAlias = Annotated[
+    Sequence[str],
+    Field(max_length=31, description="Further runs of the same problem, with other seeds."),
+]
+"""Ids of jobs; a request has the first in its path."""
 
 
 class Submission(BaseModel):
@@ -150,44 +177,26 @@ class Jobs(ABC):
     in memory. Thread-safe. A context manager: leaving the block closes it.
     """
 
+    _service: JobService
+    """Only where operations are computed in this process."""
+
+    _context = Context()
+
     @abstractmethod
-    def _send(
-        self, operation: Operation[T], path: tuple[str | int, ...], request: BaseModel | None
-    ) -> T:
+    def _answer(self, operation: Operation, arguments: Mapping[str, Any]) -> Any:
         """Compute the answer to an operation, here or on the server."""
 
     @abstractmethod
-    def _submit(
-        self,
-        operation: Operation[JobView],
-        path: tuple[str, ...],
-        request: BaseModel,
-        submission: Submission,
-    ) -> JobView:
+    def _submit(self, spec: AnySpec, submission: Submission) -> JobView:
         """Create a job."""
+
+    @abstractmethod
+    def _fork(self, job_id: str, request: ForkRequest, submission: Submission) -> JobView:
+        """Create a fork."""
 
     @abstractmethod
     def _follow(self, job_id: str, after: int | None, stop: Stop) -> Iterator[JobEvent]:
         """Yield events until the job has ended or `stop` is set."""
-
-    @abstractmethod
-    def _export(self, job_id: str, query: operations.ExportQuery) -> Iterator[bytes]:
-        """Yield the parts of a file."""
-
-    def _call(self, operation: Operation[T], *path: str | int, **arguments: Any) -> T:
-        """Validate keyword arguments and compute the answer to an operation."""
-        return self._send(operation, path, operation.request_of(arguments))
-
-    def _items(
-        self, operation: Operation[PageView[V]], *path: str, after: Any = None, **arguments: Any
-    ) -> Iterator[V]:
-        """Yield the items of all pages."""
-        while True:
-            page = self._call(operation, *path, after=after, limit=PAGE, **arguments)
-            yield from page.items
-            if page.next is None:
-                return
-            after = page.next
 
     def _decoded(self, decode: Callable[[bytes], T], content: bytes) -> T:
         """Decode an answer that is not JSON."""
@@ -234,8 +243,7 @@ class Jobs(ABC):
             IdempotencyConflict: The key was used before for another job.
         """
         chosen = chosen_spec(spec, options)
-        submission = _submission(idempotency_key, priority, notify_url)
-        return self._submit(operations.submit_job, (), chosen, submission)
+        return self._submit(chosen, _submission(idempotency_key, priority, notify_url))
 
     def fork(
         self,
@@ -273,8 +281,7 @@ class Jobs(ABC):
             IdempotencyConflict: The key was used before for another job.
         """
         request = checked(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
-        submission = _submission(idempotency_key, priority, notify_url)
-        return self._submit(operations.fork_job, (job_id,), request, submission)
+        return self._fork(job_id, request, _submission(idempotency_key, priority, notify_url))
 
     def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
@@ -291,7 +298,17 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: As `submit`.
         """
-        return self._send(operations.estimate_job, (), chosen_spec(spec, options))
+        return self._estimate(chosen_spec(spec, options))
+
+    @analysis("POST /estimates", "estimate_job", "Estimate a job")
+    def _estimate(self, spec: AnySpec) -> EstimateView:
+        """Check a job as on submission, and estimate its cost. Nothing is stored.
+
+        The time follows from the rate of earlier jobs with the same robot and controller; if there
+        are none, a short simulation is timed on the server, which may have to compile the robot's
+        kernel.
+        """
+        return EstimateView.model_validate(self._service.estimate(spec))
 
     def jobs(
         self,
@@ -323,17 +340,75 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: No such state or order.
         """
-        query = {"state": state, "parent": parent, "search": search, **asdict(where)}
-        found = self._items(operations.list_jobs, order=order, reverse=reverse, **query)
-        return islice(found, limit)
+        query: dict[str, Any] = {"state": state, "order": order, **asdict(where)}
+        page = partial(self._job_page, parent=parent, search=search, reverse=reverse, **query)
+        return islice(_items(page), limit)
 
+    @core("GET /jobs", "list_jobs", "List jobs")
+    def _job_page(
+        self,
+        *,
+        state: JobState | None = None,
+        kind: JobKind | None = None,
+        parent: JobIdText | None = None,
+        search: SearchText = "",
+        order: JobOrder = JobOrder.CREATED,
+        reverse: bool = False,
+        robot: SearchText | None = None,
+        controller: SearchText | None = None,
+        preference: SearchText | None = None,
+        tag: SearchText | None = None,
+        archived: bool | None = None,
+        after: After = None,
+        limit: PageLimit = 50,
+    ) -> PageView[JobSummaryView]:
+        """Return a page of jobs with their progress. New jobs do not shift later pages.
+
+        Args:
+            state: Only jobs in this state.
+            kind: Only jobs of this kind.
+            parent: Only forks of the job of this id.
+            search: Only jobs whose name, id, note or tags contain this, ignoring case.
+            order: `created`: newest first; `fitness`: best first; `name`: by name, ignoring case;
+                `state`: unfinished jobs first; `evaluations`, `iterations`, `priority`, `rate`:
+                largest first; `gain` over the `reference`: largest first; `time_left`: shortest
+                first. Jobs without the value come last.
+            reverse: Reverse the order; jobs without the value still come last.
+            robot: Only jobs of this robot; `own` for all custom robots.
+            controller: Only jobs that tune this controller.
+            preference: Only jobs of this preference; `own` for all custom preferences.
+            tag: Only jobs with this tag.
+            archived: True: only archived jobs; false: only others.
+            limit: Maximum number of jobs.
+        """
+        page = self._service.store.jobs(
+            state=state,
+            kind=kind,
+            parent=parent,
+            search=search,
+            where=JobFilter(
+                archived=archived,
+                robot=robot,
+                controller=controller,
+                preference=preference,
+                tag=tag,
+            ),
+            order=order,
+            reverse=reverse,
+            after=after,
+            limit=limit,
+        )
+        items = [JobSummaryView.from_job(job) for job in page.items]
+        return PageView[JobSummaryView](items=items, next=page.next)
+
+    @core("GET /jobs/{job_id}", "get_job", "Get a job")
     def job(self, job_id: str) -> JobView:
-        """Return one job.
+        """Return a job as it is now, with its spec.
 
         Returns:
-            Its spec, state, progress and best design so far.
+            State, progress, rates, estimated time left, best design and error.
         """
-        return self._call(operations.get_job, job_id)
+        return job_view(self._service, self._service.job(job_id))
 
     def command(
         self, job_id: str, command: Command | str, *, accept_changes: bool = False
@@ -350,67 +425,130 @@ class Jobs(ABC):
             Conflict: The job's state does not allow it.
             InvalidRequest: No such command.
         """
-        try:
-            operation = _COMMANDS[Command(command)]
-        except ValueError:
-            known = ", ".join(_COMMANDS)
-            raise InvalidRequest(f"{command!r} is none of {known}", field="command") from None
-        return self._call(operation, job_id, accept_changes=accept_changes)
+        if command == Command.PAUSE:
+            return self.pause(job_id)
+        if command == Command.RESUME:
+            return self.resume(job_id, accept_changes=accept_changes)
+        if command == Command.CANCEL:
+            return self.cancel(job_id)
+        commands = ", ".join(Command)
+        raise InvalidRequest(f"{command!r} is none of {commands}", field="command")
 
+    @core("POST /jobs/{job_id}/pause", "pause_job", "Pause a job", access="command", status=202)
     def pause(self, job_id: str) -> JobView:
-        """Pause a job when its current iteration is committed.
+        """Pause a job. A running job first commits its current iteration (`pausing`).
 
         Raises:
             Conflict: It is paused already, or has ended.
         """
-        return self.command(job_id, Command.PAUSE)
+        return self._command(job_id, Command.PAUSE)
 
-    def resume(self, job_id: str, *, accept_changes: bool = False) -> JobView:
-        """Queue a paused or failed job again; it continues as if it had never stopped.
+    @core(
+        "POST /jobs/{job_id}/resume",
+        "resume_job",
+        "Resume a job",
+        access="command",
+        status=202,
+        body="ResumeRequest",
+    )
+    def resume(
+        self, job_id: str, *, accept_changes: Annotated[bool, Field(examples=[True])] = False
+    ) -> JobView:
+        """Queue a paused or failed job again; it continues bit for bit as if it had never stopped.
 
         Args:
-            accept_changes: As for `command`.
+            accept_changes: Whether to continue although its provenance (code, robot, compiler)
+                changed, which is then recorded. Otherwise such a job fails and says what has
+                changed.
 
         Raises:
             Conflict: It is queued or running, or has ended otherwise.
         """
-        return self.command(job_id, Command.RESUME, accept_changes=accept_changes)
+        return self._command(job_id, Command.RESUME, accept_changes=accept_changes)
 
+    @core("POST /jobs/{job_id}/cancel", "cancel_job", "Cancel a job", access="command")
     def cancel(self, job_id: str) -> JobView:
-        """End a job for good; committed iterations stay.
+        """End a job for good. Committed iterations stay; the current one is dropped.
 
         Raises:
             Conflict: It has ended.
         """
-        return self.command(job_id, Command.CANCEL)
+        return self._command(job_id, Command.CANCEL)
 
-    def extend(self, job_id: str, iterations: int) -> JobView:
-        """Change the budget of a job; one that has succeeded is queued again.
+    def _command(self, job_id: str, command: Command, **options: Any) -> JobView:
+        job = self._service.store.command(
+            job_id, command, actor=self._context.actor, quota=self._context.quota, **options
+        )
+        return job_view(self._service, job)
+
+    @core(
+        "POST /jobs/{job_id}/extend",
+        "extend_job",
+        "Change the budget of a job",
+        access="command",
+        status=202,
+        body="ExtensionRequest",
+    )
+    def extend(
+        self,
+        job_id: str,
+        iterations: Annotated[int, Field(ge=1, le=LARGEST_BUDGET, examples=[50])],
+    ) -> JobView:
+        """Change the budget of a job; one that has succeeded is queued and continues.
+
+        Committed iterations stay, and the current iteration is committed unchanged. Later ones
+        follow the schedule of the new budget, over which a falling inertia falls: a job of 25
+        iterations extended to 50 is reproducible, but differs from a job of 50.
 
         Args:
-            iterations: Budget in all, more than the job has committed.
+            iterations: Budget in all, in iterations of `particles` designs each: more than the job
+                has spent.
 
         Raises:
             Conflict: It was cancelled.
             InvalidRequest: The budget is spent already, or too large.
         """
-        return self._call(operations.extend_job, job_id, iterations=iterations)
+        actor, quota = self._context.actor, self._context.quota
+        job = self._service.extend(job_id, iterations, actor=actor, quota=quota)
+        return job_view(self._service, job)
 
-    def prioritize(self, job_id: str, priority: int) -> JobView:
+    @operations(
+        "PUT /jobs/{job_id}/priority",
+        "prioritize_job",
+        "Change the priority of a job",
+        access="command",
+        body="PriorityRequest",
+    )
+    def prioritize(
+        self,
+        job_id: str,
+        priority: Annotated[int, Field(strict=True, ge=LOWEST, le=HIGHEST, examples=[5])],
+    ) -> JobView:
         """Change the priority of a job that has not ended.
 
-        A running job's share of the workers changes from its next iteration on.
+        Queued jobs start in order of priority, the oldest first among equals. Each step doubles a
+        running job's share of the workers, from its next iteration on; no job is interrupted.
+        Results do not depend on it.
 
         Args:
-            priority: As for `submit`.
+            priority: Higher runs sooner; the default is 0. Values above 0 require a token of scope
+                `admin`, where tokens are required.
 
         Raises:
             Conflict: It has ended.
             InvalidRequest: The priority is out of bounds.
         """
-        _check_priority(priority)
-        return self._call(operations.prioritize_job, job_id, priority=priority)
+        self._context.check_priority(priority)
+        actor = self._context.actor
+        return job_view(self._service, self._service.prioritize(job_id, priority, actor=actor))
 
+    @operations(
+        "PATCH /jobs/{job_id}",
+        "label_job",
+        "Change name, note, tags or archival of a job",
+        access="command",
+        body=LabelsChange,
+    )
     def label(
         self,
         job_id: str,
@@ -420,7 +558,7 @@ class Jobs(ABC):
         tags: Iterable[str] | None = None,
         archived: bool | None = None,
     ) -> JobView:
-        """Change the labels of a job; its spec and its results stay.
+        """Change the labels of a job, by a JSON merge patch. Its spec and results do not change.
 
         Args:
             name: Shown in place of the spec's name; "" to show that again. None leaves it
@@ -433,9 +571,9 @@ class Jobs(ABC):
             InvalidRequest: A label is too long; names it.
         """
         words = None if tags is None else tuple(tags)
-        return self._call(
-            operations.label_job, job_id, name=name, note=note, tags=words, archived=archived
-        )
+        change = LabelsChange(name=name, note=note, tags=words, archived=archived)
+        actor = self._context.actor
+        return job_view(self._service, self._service.store.label(job_id, change, actor=actor))
 
     def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Protect a job from deletion, or release it.
@@ -443,17 +581,35 @@ class Jobs(ABC):
         Args:
             kept: Whether it is protected.
         """
-        return self._call(operations.keep_job if kept else operations.release_job, job_id)
+        return self._keep(job_id) if kept else self._release(job_id)
 
+    @operations(
+        "PUT /jobs/{job_id}/keep", "keep_job", "Protect a job from deletion", access="command"
+    )
+    def _keep(self, job_id: str) -> JobView:
+        """Protect a job from deletion by users and by retention."""
+        actor = self._context.actor
+        return job_view(self._service, self._service.store.keep(job_id, kept=True, actor=actor))
+
+    @operations(
+        "DELETE /jobs/{job_id}/keep", "release_job", "End the protection of a job", access="command"
+    )
+    def _release(self, job_id: str) -> JobView:
+        """Allow deletion; a server with a retention time deletes the job when that has passed."""
+        actor = self._context.actor
+        return job_view(self._service, self._service.store.keep(job_id, kept=False, actor=actor))
+
+    @operations("DELETE /jobs/{job_id}", "delete_job", "Delete a job", access="command", status=204)
     def delete(self, job_id: str) -> None:
         """Delete a job with its iterations and evaluations, irrevocably.
 
-        Forks of it and certificates of its designs stay.
+        Forks of it and certificates of its designs stay. Its idempotency key can be used again, and
+        streams of its events end with an event `deleted`.
 
         Raises:
-            Conflict: It is protected, or has neither ended nor is paused.
+            Conflict: It is protected, or has neither ended nor is paused; cancel it first.
         """
-        self._call(operations.delete_job, job_id)
+        self._service.store.delete_job(job_id, actor=self._context.actor)
 
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Follow a job until it has ended, also while it is paused.
@@ -478,6 +634,7 @@ class Jobs(ABC):
             pass
         return self.job(job_id)
 
+    @core("GET /jobs/{job_id}/best", "get_best", "Get the best design")
     def best(self, job_id: str) -> BestView:
         """Return the best design of a job so far.
 
@@ -486,8 +643,15 @@ class Jobs(ABC):
 
         Raises:
             NotFound: No design is feasible in every scenario yet.
+            Conflict: The job cannot be read.
         """
-        return self._call(operations.get_best, job_id)
+        job, best = self._service.job(job_id), self._service.store.best(job_id)
+        if best is None:
+            raise NotFound(
+                f"job {job_id} has no feasible design yet; try again after its next iteration, or"
+                " see why designs fail by its failures"
+            )
+        return BestView.from_evaluation(best, job.spec)
 
     def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
         """List the committed iterations of a job.
@@ -498,7 +662,24 @@ class Jobs(ABC):
         Returns:
             Fitness of the designs by iteration, in order.
         """
-        return self._items(operations.list_iterations, job_id, after=after)
+        return _items(partial(self._iteration_page, job_id), after=after)
+
+    @core("GET /jobs/{job_id}/iterations", "list_iterations", "List committed iterations")
+    def _iteration_page(
+        self,
+        job_id: str,
+        *,
+        after: AfterIteration = None,
+        limit: Annotated[int, Field(ge=1, le=1000)] = 100,
+    ) -> PageView[IterationView]:
+        """Return a page of iterations with statistics of their fitness, for convergence plots.
+
+        Args:
+            limit: Maximum number of iterations.
+        """
+        page = self._service.store.iterations(job_id, after=after, limit=limit)
+        items = [IterationView.model_validate(iteration) for iteration in page.items]
+        return PageView[IterationView](items=items, next=page.next)
 
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
         """List the committed iterations of a job with every design.
@@ -507,8 +688,26 @@ class Jobs(ABC):
             Iterations in order, each with its evaluations.
         """
         for iteration in self.iterations(job_id):
-            evaluations = self._call(operations.list_evaluations, job_id, iteration.index)
+            evaluations = self._evaluations(job_id, iteration.index)
             yield HistoryIterationView(**dict(iteration), evaluations=evaluations.items)
+
+    @analysis(
+        "GET /jobs/{job_id}/iterations/{iteration}/evaluations",
+        "list_evaluations",
+        "List the evaluations of an iteration",
+        heavy=False,
+    )
+    def _evaluations(self, job_id: str, iteration: int) -> CatalogueView[EvaluationView]:
+        """Return every design with its values, its fitness, and its results in each scenario.
+
+        Objectives are raw; utilities follow from them and the job's preference.
+
+        Raises:
+            Conflict: The job cannot be read.
+        """
+        spec = self._service.job(job_id).spec
+        evaluations = self._service.store.evaluations(job_id, iteration)
+        return CatalogueView(items=evaluation_views(evaluations, spec))
 
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Return every evaluation of a job at once, as arrays.
@@ -520,6 +719,12 @@ class Jobs(ABC):
         read = partial(EvaluationTable.from_parquet, spec)
         return self._decoded(read, b"".join(self.export(job_id)))
 
+    @analysis(
+        "POST /jobs/{job_id}/ranking",
+        "rank_designs",
+        "Rank designs under another preference",
+        body=RankingRequest,
+    )
     def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
         """Rank all designs of a job under another preference; nothing is simulated.
 
@@ -535,10 +740,18 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: An argument is invalid.
         """
-        return self._call(operations.rank_designs, job_id, preference=preference, top=top)
+        return self._service.ranking(job_id, RankingRequest(preference=preference, top=top))
 
-    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
-        """Determine which scenarios of a job matter; nothing is simulated.
+    @analysis(
+        "GET /jobs/{job_id}/scenarios", "get_scenario_families", "Get the importance of scenarios"
+    )
+    def scenarios(
+        self,
+        job_id: str,
+        *,
+        tolerance: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = TOLERANCE,
+    ) -> ScenarioFamiliesView:
+        """Determine which scenarios of a job matter, from stored objectives.
 
         Args:
             job_id: Identifier of a job that tunes a drive.
@@ -551,10 +764,11 @@ class Jobs(ABC):
             InvalidRequest: The tolerance is invalid.
             Conflict: No design of it succeeds in all scenarios.
         """
-        return self._call(operations.get_scenario_families, job_id, tolerance=tolerance)
+        return self._service.scenarios(job_id, tolerance=tolerance)
 
+    @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> FailuresView:
-        """Count the failed designs of a job by case and status; nothing is simulated.
+        """Count the failed designs of a job by case and status, from stored statuses.
 
         Args:
             job_id: Identifier of a job of any kind.
@@ -562,10 +776,11 @@ class Jobs(ABC):
         Returns:
             Cases with failures, most failures first; each status with its latest design.
         """
-        return self._call(operations.get_failures, job_id)
+        return self._service.failures(job_id)
 
+    @analysis("GET /jobs/{job_id}/importance", "get_importance", "Get the importance of variables")
     def importance(self, job_id: str) -> ImportanceView:
-        """Determine which variables of a job matter; nothing is simulated.
+        """Determine which variables of a job matter, from stored objectives.
 
         Args:
             job_id: Identifier of a job that tunes a drive or fits parameters.
@@ -577,10 +792,17 @@ class Jobs(ABC):
         Raises:
             Conflict: It has no design yet.
         """
-        return self._call(operations.get_importance, job_id)
+        return self._service.importance(job_id)
 
-    def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
-        """Compare jobs; nothing is simulated.
+    @analysis("GET /jobs/{job_id}/comparison", "compare_jobs", "Compare jobs")
+    def comparison(
+        self,
+        job_ids: Annotated[
+            Sequence[str],
+            Field(max_length=MOST_JOBS - 1, description="Further jobs, each once."),
+        ],
+    ) -> JobComparisonView:
+        """Compare jobs by their convergence, their designs and their specs.
 
         Args:
             job_ids: 1 to 12 jobs, each once.
@@ -592,8 +814,14 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: There are none, too many, or one is named twice.
         """
-        return self._call_about(operations.compare_jobs, job_ids)
+        return self._service.comparison(job_ids)
 
+    @analysis(
+        "POST /jobs/{job_id}/preferences",
+        "find_robust_preferences",
+        "Rank designs under many preferences",
+        body=PreferencesRequest,
+    )
     def preferences(
         self,
         job_id: str,
@@ -627,9 +855,7 @@ class Jobs(ABC):
             InvalidRequest: An argument is invalid, or it takes more than the server allows.
             Conflict: No design of it succeeds in all scenarios.
         """
-        return self._call(
-            operations.find_robust_preferences,
-            job_id,
+        request = PreferencesRequest(
             drawn=drawn,
             candidates=candidates,
             samples=samples,
@@ -637,9 +863,19 @@ class Jobs(ABC):
             seed=seed,
             precision=precision,
         )
+        limits = self._context.limits
+        limits.check_ranked(drawn, self._service.job(job_id))
+        index = partial(sampled_indices, check=limits.check_sampled)
+        return self._service.preferences(job_id, request, index)
 
-    def front(self, job_id: str, *, most: int = 1000) -> FrontView:
-        """Find the Pareto front of a job over f1 to f5; nothing is simulated.
+    @analysis("GET /jobs/{job_id}/front", "get_front", "Get the Pareto front")
+    def front(
+        self,
+        job_id: str,
+        *,
+        most: Annotated[int, Field(ge=1, le=MOST_FRONT_DESIGNS)] = FRONT_DESIGNS,
+    ) -> FrontView:
+        """Find the Pareto front of a job over f1 to f5, from stored objectives.
 
         Args:
             job_id: Identifier of a job that tunes a drive.
@@ -653,10 +889,13 @@ class Jobs(ABC):
             InvalidRequest: The number is invalid.
             Conflict: No design of it succeeds in all scenarios.
         """
-        return self._call(operations.get_front, job_id, most=most)
+        return self._service.front(job_id, most=most)
 
-    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
-        """Find the preference under which a design wins its job; nothing is simulated.
+    @analysis(
+        "GET /jobs/{job_id}/preference-for", "get_preference_for", "Find a preference for a design"
+    )
+    def preference_for(self, job_id: str, iteration: Index, particle: Index) -> PreferenceForView:
+        """Find the preference under which a design wins its job, from stored objectives.
 
         Args:
             job_id: Identifier of a job that tunes a drive.
@@ -671,33 +910,42 @@ class Jobs(ABC):
             NotFound: The job has no such design.
             Conflict: The design fails in a scenario.
         """
-        return self._call(
-            operations.get_preference_for, job_id, iteration=iteration, particle=particle
-        )
+        return self._service.preference_for(job_id, iteration, particle)
 
-    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
+    @analysis(
+        "GET /jobs/{job_id}/parameters", "get_parameters", "Get the identifiability of parameters"
+    )
+    def parameters(self, job_ids: Runs) -> IdentifiabilityView:
         """Determine the parameters on which runs of one problem agree.
+
+        Mainly for jobs of kind `identification`. A single run always narrows; only runs with
+        different seeds that narrow to the same values show that a parameter is identifiable.
 
         Args:
             job_ids: Jobs that differ in name, seed, optimizer and iterations alone; at least one.
 
         Returns:
-            Intervals of every variable among designs close to the best.
+            Intervals of every variable among designs within twelve thresholds of the best.
 
         Raises:
             InvalidRequest: The jobs are of different problems, or have one seed.
             Conflict: One of them has no feasible design yet.
         """
-        return self._call_about(operations.get_parameters, job_ids)
+        return self._service.parameters(job_ids)
 
-    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
-        """Return the deviations of runs of a calibration from their targets.
+    @analysis(
+        "GET /jobs/{job_id}/targets",
+        "get_targets",
+        "Get the deviations of a calibration from its targets",
+    )
+    def targets(self, job_ids: Runs, *, leave_out: LeaveOut | None = None) -> TargetsView:
+        """Return the deviations of runs of a calibration from their targets, in tolerances.
 
         Args:
             job_ids: Calibrations that differ in name, seed, optimizer and iterations alone; at
                 least one.
-            leave_out: "target" to predict every target by the design that is best without it,
-                "walk" for without all targets of its simulation; nothing is simulated.
+            leave_out: `target` to predict every target by the design that is best without it,
+                `walk` for without all targets of its simulation; nothing is simulated.
 
         Returns:
             The values of every target for the best design of all runs, and the predictions.
@@ -706,16 +954,27 @@ class Jobs(ABC):
             InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
             Conflict: One of them has no feasible design yet.
         """
-        return self._call_about(operations.get_targets, job_ids, leave_out=leave_out)
+        return self._service.targets(job_ids, leave_out)
 
+    @analysis(
+        "GET /jobs/{job_id}/certificate",
+        "get_certificate",
+        "Get the results of a design in many worlds",
+    )
     def certificate(
-        self, job_id: str, *, worlds: int | None = None, most: int = 5
+        self,
+        job_id: str,
+        *,
+        worlds: Annotated[int | None, Field(ge=1, le=1_000_000)] = None,
+        most: Annotated[int, Field(ge=0, le=MOST_WORST)] = 5,
     ) -> CertificateView:
-        """Summarize the results of a design in many worlds.
+        """Summarize the results of a design in the worlds simulated so far.
+
+        The `replay` of a world is a command; its `values` are the `world` of POST /v1/replays.
 
         Args:
             job_id: Identifier of a certificate.
-            worlds: Number of worlds, from the first; None for all that were simulated.
+            worlds: Number of worlds, from the first; by default all that were simulated.
             most: Number of worst worlds to list, 0 to 1000.
 
         Returns:
@@ -725,7 +984,7 @@ class Jobs(ABC):
             InvalidRequest: An argument is invalid.
             Conflict: No world was simulated yet.
         """
-        return self._call(operations.get_certificate, job_id, worlds=worlds, most=most)
+        return self._service.certificate(job_id, worlds=worlds, most=most)
 
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Write every evaluation of a job as a file.
@@ -739,15 +998,45 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: No such format.
         """
-        try:
-            query = checked(operations.ExportQuery, {"format": file_format})
-        except InvalidRequest as error:
-            message = str(error).removeprefix(f"{error.field}: ")
-            raise InvalidRequest(message, field="file_format") from error
-        return self._export(job_id, query)
+        if file_format not in MEDIA_TYPES:
+            formats = " or ".join(MEDIA_TYPES)
+            raise InvalidRequest(f"must be {formats}, it is {file_format!r}", field="file_format")
+        return self._table(job_id, format=file_format)
 
+    @analysis(
+        "GET /jobs/{job_id}/export",
+        "export_job",
+        "Download all evaluations",
+        heavy=False,
+        media_types=MEDIA_TYPES,
+        filename="{job_id}.{format}",
+    )
+    def _table(self, job_id: str, *, format: TableFormat = "csv") -> Iterator[bytes]:  # noqa: A002
+        """Return one row per design: iteration, particle, fitness, `design.<variable>`, and for
+        every scenario `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`.
+        Floats are exact.
+
+        Args:
+            format: Format of the file.
+
+        Returns:
+            The table, as a file.
+
+        Raises:
+            Conflict: The job cannot be read.
+        """
+        job = self._service.job(job_id)
+        return encoded_table(format, job.spec, self._service.column_pieces(job))
+
+    @analysis(
+        "GET /jobs/{job_id}/evidence",
+        "get_evidence",
+        "Download evidence",
+        media_type=ZIP,
+        filename="{job_id}.zip",
+    )
     def evidence(self, job_id: str) -> bytes:
-        """Write an archive that documents a job's run, for `gaitswarm.verify`.
+        """Write an archive that documents a job's run; `gaitswarm verify` checks it anywhere.
 
         Returns:
             A zip archive as in docs/evidence.md: spec, robot, provenance, all evaluations, finished
@@ -756,12 +1045,22 @@ class Jobs(ABC):
         Raises:
             Conflict: The job has no committed iteration yet.
         """
-        return self._call(operations.get_evidence, job_id)
+        from gaitswarm.evidence.contents import evidence
 
+        return evidence(self._service, job_id)
+
+    @analysis(
+        "POST /jobs/{job_id}/verify",
+        "verify_history",
+        "Verify the stored history",
+        body=VerificationRequest,
+    )
     def verify(
         self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
     ) -> HistoryVerificationView:
-        """Verify the stored history of a job.
+        """Recompute the digests of a job's iterations and report the first that differs.
+
+        Evaluations can be simulated again to compare every bit; their simulated time is limited.
 
         Args:
             replay: Evaluations to draw and simulate again, besides the best one; 0 for none.
@@ -776,10 +1075,25 @@ class Jobs(ABC):
             InvalidRequest: An argument is invalid, or the simulations exceed the server's limit.
             EvaluatorUnavailable: Simulations cannot be run there.
         """
-        return self._call(operations.verify_history, job_id, replay=replay, seed=seed, head=head)
+        from gaitswarm.evidence.verify import run_verification
 
+        request = VerificationRequest(replay=replay, seed=seed, head=head)
+        check = self._context.limits.check_repeated
+        return run_verification(self._service, job_id, request, check=check)
+
+    @robots(
+        "POST /recordings",
+        "add_recording",
+        "Add a recording",
+        access="submit",
+        status=201,
+        location=lambda recording: f"/recordings/{recording.id}",
+    )
     def record(self, walk: RecordedWalk) -> RecordingView:
-        """Store a recorded walk, to which jobs can fit parameters of the robot.
+        """Store a recorded walk, to which jobs of kind `identification` can fit parameters.
+
+        The id is a hash of the content. `gaitswarm record` and POST /v1/measured-walks make a
+        recording from a measured log.
 
         Args:
             walk: Motor currents of a measured walk. The same walk again is the same recording.
@@ -787,7 +1101,8 @@ class Jobs(ABC):
         Returns:
             The recording's id, and a summary of the walk.
         """
-        return self._send(operations.add_recording, (), walk)
+        recording_id = self._service.store.add_recording(walk, actor=self._context.actor)
+        return RecordingView.from_walk(recording_id, walk)
 
     def recordings(
         self, *, search: str = "", limit: int | None = None
@@ -801,18 +1116,39 @@ class Jobs(ABC):
         Returns:
             The walks without their currents.
         """
-        return islice(self._items(operations.list_recordings, search=search), limit)
+        return islice(_items(partial(self._recording_page, search=search)), limit)
 
+    @robots("GET /recordings", "list_recordings", "List recordings")
+    def _recording_page(
+        self, *, search: SearchText = "", after: After = None, limit: PageLimit = 50
+    ) -> PageView[RecordingEntryView]:
+        """Return a page of recordings without their numbers, newest first. New ones do not shift
+        later pages.
+
+        Every token with read access sees all of them, as with jobs.
+
+        Args:
+            search: Only recordings whose id, scenario or controller contain this, ignoring case.
+            limit: Maximum number of recordings.
+        """
+        page = self._service.store.recording_list(search=search, after=after, limit=limit)
+        items = [RecordingEntryView.from_entry(entry) for entry in page.items]
+        return PageView[RecordingEntryView](items=items, next=page.next)
+
+    @robots("GET /recordings/{recording_id}", "get_recording", "Get a recording")
     def recording(self, recording_id: str) -> RecordedWalk:
-        """Return a recorded walk.
+        """Return a recorded walk with its numbers.
 
         Args:
             recording_id: Identifier, as `record` returned it.
 
         Returns:
             The walk as it was given.
+
+        Raises:
+            Conflict: The recording cannot be read.
         """
-        return self._call(operations.get_recording, recording_id)
+        return self._service.recording(recording_id)
 
     def simulate(
         self,
@@ -850,23 +1186,44 @@ class Jobs(ABC):
             InvalidRequest: An argument is invalid, the gait leaves the legs' reach, or the
                 simulations are longer than the server allows.
         """
-        view = self._call(
-            operations.simulate,
-            design=design,
-            scenarios=scenarios,
-            controller=controller,
-            robot=robot,
-            preference=preference,
-            precision=precision,
-            world=world,
-            log=log,
-        )
+        document = {
+            "design": design,
+            "scenarios": scenarios,
+            "controller": controller,
+            "robot": robot,
+            "preference": preference,
+            "precision": precision,
+            "world": world,
+            "log": log,
+        }
+        view = self._simulation(checked(SimulationRequest, document))
         return SimulationResult.from_view(view)
 
+    @analysis("POST /simulations", "simulate", "Simulate one design")
+    def _simulation(self, design: SimulationRequest) -> SimulationView:
+        """Simulate one design in the given scenarios and return objectives, utilities and fitness.
+
+        Nothing is stored. The simulated time is limited, as the response waits for the simulations;
+        use a job to search.
+        """
+        seconds = design.simulated_seconds(design.resolved_scenarios())
+        self._context.limits.check(seconds, logged=design.log, field="scenarios")
+        return run_simulation(design)
+
+    @analysis(
+        "POST /robustness",
+        "estimate_robustness",
+        "Estimate the robustness of one design",
+        body=RobustnessRequest,
+    )
     def robustness(
         self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
     ) -> RobustnessView:
-        """Estimate where the jobs are how robust a design is; see `gaitswarm.robustness`.
+        """Estimate how robust a design is, as `gaitswarm.robustness`.
+
+        Where the jobs are, the design and others around it are simulated, to estimate the norm of
+        the Jacobian of the objectives with respect to the variables, both normalized (thesis
+        4.4.3). Nothing is stored. A server limits the simulated time.
 
         Args:
             design: As for `simulate`.
@@ -878,7 +1235,10 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: As `simulate`, or the sample is invalid.
         """
-        return self._call(operations.estimate_robustness, design=design, **options)
+        request = RobustnessRequest(design=design, **options)
+        seconds = request.simulated_seconds(request.resolved_scenarios())
+        self._context.limits.check_sampled(seconds * (1 + request.samples))
+        return run_robustness(request)
 
     def replay(
         self,
@@ -906,17 +1266,38 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: As `simulate`.
         """
-        content = self._call(
-            operations.replay,
-            design=design,
-            scenario=scenario,
-            controller=controller,
-            robot=robot,
-            world=world,
-            rate=rate,
-        )
-        return self._decoded(decoded_replay, content)
+        document = {
+            "design": design,
+            "scenario": scenario,
+            "controller": controller,
+            "robot": robot,
+            "world": world,
+            "rate": rate,
+        }
+        return self._decoded(decoded_replay, self._replay(checked(ReplayRequest, document)))
 
+    @analysis("POST /replays", "replay", "Replay one simulation")
+    def _replay(self, design: ReplayRequest) -> bytes:
+        """Simulate one design in one scenario and return the pose of every link, frame by frame.
+
+        A failed simulation is replayed up to its end, with its status in the header. Nothing is
+        stored; the simulated time is limited as for simulations with logs.
+
+        Returns:
+            Length of the header in bytes (uint32), the header (JSON, a ReplayHeaderView, padded
+            with spaces to a multiple of 4), then frame after frame of float32 numbers in the order
+            of the header's channels; all little-endian.
+        """
+        seconds = design.simulated_seconds([resolved(design.scenario)])
+        self._context.limits.check(seconds, logged=True, field="scenario")
+        return run_replay(design)
+
+    @analysis(
+        "POST /controllers/{controller}/surface",
+        "controller_surface",
+        "Get a fuzzy controller's surface",
+        body=SurfaceRequest,
+    )
     def surface(
         self,
         design: Mapping[str, float | str],
@@ -926,7 +1307,10 @@ class Jobs(ABC):
         current_points: int = 33,
         velocity_error: float = 0.0,
     ) -> SurfaceView:
-        """Compute the surfaces of a fuzzy controller, by its rules and by its table.
+        """Compute a fuzzy controller's output over angle error and motor current.
+
+        Sets and rules are those of the thesis; the microcontroller uses the table instead of
+        inference.
 
         Args:
             design: Value of each of the controller's variables, in their units.
@@ -936,20 +1320,21 @@ class Jobs(ABC):
             velocity_error: At which the surfaces of fuzzy-pi-3 are computed [counts/s].
 
         Returns:
-            Sets, rules and surfaces of every output.
+            Sets, rules and the surfaces of every output, by the rules and by the lookup table.
 
         Raises:
             InvalidRequest: The controller is not fuzzy, or an argument is invalid.
             NotFound: No such controller.
         """
-        return self._call(
-            operations.controller_surface,
-            controller,
+        if controller not in CONTROLLERS:
+            raise NotFound(CONTROLLERS.unknown(controller))
+        request = SurfaceRequest(
             design=design,
             error_points=error_points,
             current_points=current_points,
             velocity_error=velocity_error,
         )
+        return run_surface(controller, request)
 
     def write_firmware(
         self,
@@ -989,21 +1374,35 @@ class Jobs(ABC):
 
     def _firmware(self, request: FirmwareRequest) -> tuple[FirmwareView, Mapping[str, bytes]]:
         """Compute firmware and its description."""
-        view = self._send(operations.summarize_firmware, (), request)
-        archive = self._send(operations.write_firmware, (), request)
-        return view, self._decoded(unzipped, archive)
+        return self._firmware_summary(request), self._decoded(
+            unzipped, self._firmware_archive(request)
+        )
 
-    def _call_about(self, operation: Operation[T], job_ids: Sequence[str], **arguments: Any) -> T:
-        if isinstance(job_ids, str) or not job_ids:
-            raise InvalidRequest("must be a list of at least one id", field="job_ids")
-        first, *also = job_ids
-        try:
-            return self._call(operation, first, also=also, **arguments)
-        except InvalidRequest as error:
-            if not error.field.startswith("also"):
-                raise
-            message = str(error).removeprefix(f"{error.field}: ")
-            raise InvalidRequest(f"{message}, after the first", field="job_ids") from error
+    @analysis(
+        "POST /firmware",
+        "write_firmware",
+        "Download one design as firmware",
+        media_type=ZIP,
+        filename="firmware.zip",
+    )
+    def _firmware_archive(self, request: FirmwareRequest) -> bytes:
+        """Return any design as C99 for a leg's microcontroller, with a test of its simulations.
+
+        Nothing is stored. The simulated time is limited, as the response waits for the simulations.
+
+        Returns:
+            The folder, as an archive.
+        """
+        self._context.limits.check(request.walked_seconds, field="scenarios")
+        return zipped(run_firmware(request).files)
+
+    @analysis("POST /firmware/summary", "summarize_firmware", "Summarize a design's firmware")
+    def _firmware_summary(self, request: FirmwareRequest) -> FirmwareView:
+        """Return files with sizes, tables, trajectories by scenario, and flash and RAM compared
+        with the thesis's microcontroller. Nothing is stored.
+        """
+        self._context.limits.check(request.walked_seconds, field="scenarios")
+        return firmware_view(request, run_firmware(request))
 
     @abstractmethod
     def close(self) -> None:
@@ -1019,6 +1418,22 @@ class Jobs(ABC):
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def job_view(service: JobService, job: Job) -> JobView:
+    """Return the view of a job with its best design."""
+    has_best = job.progress.best_fitness is not None
+    return JobView.from_job_and_best(job, service.store.best(job.id) if has_best else None)
+
+
+def _items(page: Callable[..., PageView[V]], after: Any = None) -> Iterator[V]:
+    """Yield the items of all pages."""
+    while True:
+        read = page(after=after, limit=PAGE)
+        yield from read.items
+        if read.next is None:
+            return
+        after = read.next
 
 
 def _submission(idempotency_key: str | None, priority: int, notify_url: str | None) -> Submission:

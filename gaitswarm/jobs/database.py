@@ -7,29 +7,28 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from functools import cache
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
-from pydantic import BaseModel
-
-from gaitswarm import operations
 from gaitswarm.errors import Interrupted, simulation_errors
 from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
-from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
+from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.embedded import check_workers, ctrl_c, earlier_job, taken_up
-from gaitswarm.operations import Operation
+from gaitswarm.jobs.operation import Operation
 from gaitswarm.services.optimizer.analysis.reference import note_reference
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedded
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.specs import SpecInput, chosen_spec
 from gaitswarm.tables import EvaluationTable
 from gaitswarm.views.history import HistoryIterationView, IterationView
-from gaitswarm.views.job import JobView
+from gaitswarm.views.job import JobView, StateView
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from gaitswarm.services.runtime import EvaluatorKind
 
 POLL_SECONDS: Final = 0.5
 """Time between two readings of a followed job [s]."""
@@ -67,32 +66,37 @@ class DatabaseJobs(Jobs):
             return ""
         return f" --db {shlex.quote(masked_url(self._url))}"
 
-    def _send(
-        self, operation: Operation[T], path: tuple[str | int, ...], request: BaseModel | None
-    ) -> T:
-        subject = "" if operation.request is None else operation.request.name
-        with simulation_errors(subject):
-            arguments = path if request is None else (*path, request)
-            return operation.answer(self._service, *arguments)
+    def _answer(self, operation: Operation, arguments: Mapping[str, Any]) -> Any:
+        given = operation.arguments(*operation.validated(arguments))
+        with simulation_errors(operation.names[0] if operation.names else ""):
+            return operation.function(self, **given)
 
-    def _submit(
-        self,
-        operation: Operation[JobView],
-        path: tuple[str, ...],
-        request: BaseModel,
-        submission: Submission,
-    ) -> JobView:
-        with simulation_errors((path and "fork") or "spec"):
-            return operation.answer(self._service, *path, request, **dict(submission))
+    def _submit(self, spec: AnySpec, submission: Submission) -> JobView:
+        with simulation_errors("spec"):
+            job, _ = self._service.submit(spec, **dict(submission))
+        return job_view(self._service, job)
+
+    def _fork(self, job_id: str, request: ForkRequest, submission: Submission) -> JobView:
+        with simulation_errors("fork"):
+            job, _ = self._service.fork(job_id, request, **dict(submission))
+        return job_view(self._service, job)
 
     def _follow(self, job_id: str, after: int | None, stop: Stop) -> Iterator[JobEvent]:
-        query = operations.EventsQuery(after=after)
-        return operations.stream_events.answer(
-            self._service, job_id, query, wait=lambda: stop.wait(self._poll_seconds)
-        )
-
-    def _export(self, job_id: str, query: operations.ExportQuery) -> Iterator[bytes]:
-        return self._send(operations.export_job, (job_id,), query)
+        sent = None
+        while True:
+            # The job is read first: the iterations that it counts are then among those read.
+            job = self._service.job(job_id)
+            for iteration in self.iterations(job_id, after=after):
+                after = iteration.index
+                yield iteration
+            if (job.state, job.waiting) != sent:
+                sent = (job.state, job.waiting)
+                yield StateView.from_job(job)
+            if job.state.terminal:
+                self._service.store.verify()
+                return
+            if not stop.wait(self._poll_seconds):
+                return
 
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
         """Read committed iterations with their designs, many at once."""
@@ -181,6 +185,8 @@ class DatabaseJobs(Jobs):
             ProvenanceChanged: The provenance has changed, which is not accepted.
             EvaluatorUnavailable: The cluster cannot be reached.
         """
+        from gaitswarm.services.runtime import open_evaluator, run_embedded
+
         check_workers(evaluator, cpus)
         stop = stop or threading.Event()
         job_id = job if isinstance(job, str) else job.job.id
@@ -216,7 +222,7 @@ class DatabaseJobs(Jobs):
                 )
         except KeyboardInterrupt as error:
             raise Interrupted(self.job(job_id), self._url) from error
-        view = operations.full_view(self._service, note_reference(self._service.store, ended))
+        view = job_view(self._service, note_reference(self._service.store, ended))
         if interrupted.is_set() and not ended.state.terminal:
             raise Interrupted(view, self._url)
         return view

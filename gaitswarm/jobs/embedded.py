@@ -6,14 +6,16 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, Final, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from gaitswarm.errors import Conflict, InvalidRequest, ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.runtime import EvaluatorKind
+
+if TYPE_CHECKING:
+    from gaitswarm.services.runtime import EvaluatorKind
 
 _RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States from which a job continues only by a command."""
@@ -21,6 +23,8 @@ _RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 
 def check_workers(evaluator: EvaluatorKind | Evaluator, cpus: int | None) -> None:
     """Raise InvalidRequest for an unknown kind of workers, or less than one thread."""
+    from gaitswarm.services.runtime import EvaluatorKind
+
     kinds = get_args(EvaluatorKind)
     if isinstance(evaluator, str) and evaluator not in kinds:
         raise InvalidRequest(f"{evaluator!r} is none of {', '.join(kinds)}", field="evaluator")

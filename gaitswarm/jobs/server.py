@@ -6,19 +6,20 @@ import ssl
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, suppress
 from socket import SHUT_RDWR
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, get_origin
 from urllib.parse import quote, urlsplit
 
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from gaitswarm import operations
 from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
 from gaitswarm.jobs.attempts import Attempts, foreign, unreachable
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
-from gaitswarm.operations import Operation
+from gaitswarm.jobs.operation import Operation
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.views.base import PREFIX
@@ -89,28 +90,40 @@ class ServerJobs(Jobs):
         """Options by which a command reaches the same jobs."""
         return f" --server {masked_url(self._url)}"
 
-    def _send(
-        self, operation: Operation[T], path: tuple[str | int, ...], request: BaseModel | None
-    ) -> T:
-        return self._read(operation, self._response(operation, path, request))
+    def _answer(self, operation: Operation, arguments: Mapping[str, Any]) -> Any:
+        path, request = operation.validated(arguments)
+        options: dict[str, Any] = {"repeatable": operation.reads}
+        if request is not None and operation.method == "GET":
+            options["params"] = request.model_dump(mode="json", exclude_none=True)
+        elif request is not None:
+            options["body"] = request
+        url = operation.path.format_map({name: _segment(part) for name, part in path.items()})
+        if get_origin(operation.result) is Iterator:
+            return self._parts(url, **options)
+        response = self._response(operation.method, url, **options)
+        if operation.result is bytes:
+            return response.content
+        return self._decoded(operation.adapter.validate_json, response.content or b"null")
 
-    def _submit(
-        self,
-        operation: Operation[JobView],
-        path: tuple[str, ...],
-        request: BaseModel,
-        submission: Submission,
-    ) -> JobView:
+    def _submit(self, spec: AnySpec, submission: Submission) -> JobView:
+        return self._created("/jobs", spec, submission)
+
+    def _fork(self, job_id: str, request: ForkRequest, submission: Submission) -> JobView:
+        return self._created(f"/jobs/{_segment(job_id)}/fork", request, submission)
+
+    def _created(self, url: str, body: BaseModel, submission: Submission) -> JobView:
         headers = {
             "Idempotency-Key": submission.idempotency_key or uuid.uuid4().hex,
             "Job-Priority": str(submission.priority),
         }
         if submission.notify_url is not None:
             headers["Notify-URL"] = submission.notify_url
-        return self._read(operation, self._response(operation, path, request, headers))
+        response = self._response("POST", url, body=body, headers=headers)
+        return self._decoded(JobView.model_validate_json, response.content)
 
-    def _export(self, job_id: str, query: operations.ExportQuery) -> Iterator[bytes]:
-        with self._stream(operations.export_job, job_id, query) as response:
+    def _parts(self, url: str, **options: Any) -> Iterator[bytes]:
+        """Yield the parts of a file."""
+        with closing(self._response("GET", url, stream=True, **options)) as response:
             try:
                 yield from response.iter_bytes()
             except httpx2.HTTPError as error:
@@ -156,8 +169,9 @@ class ServerJobs(Jobs):
         headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
         if after is not None:
             headers["Last-Event-ID"] = str(after)
+        url = f"/jobs/{_segment(job_id)}/events"
         with (
-            self._stream(operations.stream_events, job_id, None, headers) as response,
+            closing(self._response("GET", url, headers=headers, stream=True)) as response,
             stop.waking(lambda: _shut(response)),
         ):
             for sent in httpx2.EventSource(response):
@@ -169,27 +183,6 @@ class ServerJobs(Jobs):
         """Close the connections."""
         self._client.close()
 
-    @contextmanager
-    def _stream(
-        self,
-        operation: Operation[Any],
-        job_id: str,
-        query: BaseModel | None,
-        headers: Mapping[str, str] | None = None,
-    ) -> Iterator[httpx2.Response]:
-        """Open a successful response whose body is read piece by piece."""
-        response = self._response(operation, (job_id,), query, headers or {}, stream=True)
-        try:
-            yield response
-        finally:
-            response.close()
-
-    def _read(self, operation: Operation[T], response: httpx2.Response) -> T:
-        """Decode a successful response."""
-        if operation.result is bytes:
-            return response.content  # type: ignore[return-value]
-        return self._decoded(operation.adapter.validate_json, response.content or b"null")
-
     def _decoded(self, decode: Callable[[bytes], T], content: bytes) -> T:
         try:
             return decode(content)
@@ -198,28 +191,30 @@ class ServerJobs(Jobs):
 
     def _response(
         self,
-        operation: Operation[Any],
-        path: tuple[str | int, ...],
-        request: BaseModel | None,
-        headers: Mapping[str, str] | None = None,
+        method: str,
+        url: str,
         *,
+        params: Mapping[str, Any] | None = None,
+        body: BaseModel | None = None,
+        headers: Mapping[str, str] | None = None,
+        repeatable: bool = True,
         stream: bool = False,
     ) -> httpx2.Response:
-        """Return a successful response, after as many attempts as necessary and allowed."""
-        arguments: dict[str, Any] = {"headers": dict(headers or {})}
-        if request is not None and operation.method == "GET":
-            arguments["params"] = request.model_dump(mode="json", exclude_none=True)
-        elif request is not None:
-            arguments["content"] = request.model_dump_json()
-            arguments["headers"]["Content-Type"] = "application/json"
-        names = dict(zip(operation.path_names, map(_segment, path), strict=True))
-        url = operation.path.format(**names)
-        repeatable = operation.reads or "Idempotency-Key" in arguments["headers"]
+        """Return a successful response, after as many attempts as necessary and allowed.
+
+        repeatable: whether it is safe to send the request again.
+        """
+        headers = dict(headers or {})
+        if body is not None:
+            headers["Content-Type"] = "application/json"
+        content = None if body is None else body.model_dump_json()
         attempts = Attempts(self._url, self._backoff, repeatable=repeatable)
         while True:
-            sent = self._client.build_request(operation.method, url, **arguments)
+            request = self._client.build_request(
+                method, url, params=params, content=content, headers=headers
+            )
             try:
-                response = self._client.send(sent, stream=stream)
+                response = self._client.send(request, stream=stream)
                 if response.is_success:
                     return response
                 response.read()

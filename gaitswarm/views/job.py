@@ -16,16 +16,14 @@ from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import (
-    LARGEST_BUDGET,
     Job,
     JobState,
     UnreadableSpec,
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
-from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
-from gaitswarm.services.optimizer.views import Finite, JobName, Request, View
+from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.views.base import job_links
 from gaitswarm.views.history import BestView
@@ -346,37 +344,6 @@ def _summary(job: Job) -> dict[str, object]:
         "tags": job.labels.tags,
         "links": job_links(job),
     }
-
-
-class ExtensionRequest(Request):
-    """New budget of a job."""
-
-    iterations: int = Field(
-        ge=1,
-        le=LARGEST_BUDGET,
-        description="Budget in all, in iterations of `particles` designs each: more than the job"
-        " has spent [1].",
-        examples=[50],
-    )
-
-
-class ResumeRequest(Request):
-    """Options for resuming a job."""
-
-    accept_changes: bool = Field(
-        default=False,
-        description="Whether to continue although its provenance changed, which is then recorded."
-        " Otherwise such a job fails and says what has changed.",
-        examples=[True],
-    )
-
-
-class PriorityRequest(Request):
-    """New priority of a job."""
-
-    priority: int = Field(
-        ge=LOWEST, le=HIGHEST, description="Higher runs sooner; the default is 0 [1].", examples=[5]
-    )
 
 
 class JobFacetsView(View):

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx2
 import pytest
 
-from gaitswarm.operations import OPERATIONS
+from gaitswarm.jobs.operation import OPERATIONS
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
@@ -18,7 +18,7 @@ WHOLE_HISTORIES = {
     *("get_distribution", "get_particles", "rank_designs", "get_scenario_families", "get_front"),
     *("get_importance", "compare_jobs", "list_convergences"),
     *("get_preference_for", "get_certificate", "get_targets", "get_parameters"),
-    *("get_evidence", "fork_job"),
+    "get_evidence",
 }
 
 

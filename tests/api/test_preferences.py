@@ -7,7 +7,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from gaitswarm.api.dependencies import MOST_RANKED
+from gaitswarm.api.routes import MOST_RANKED
 from gaitswarm.services.optimizer.jobs.job import Job
 from tests.api.conftest import Commit, Serve
 
@@ -72,7 +72,7 @@ def test_what_takes_too_long_is_refused(
     assert walked.status_code == 422
     (error,) = walked.json()["errors"]
     assert error["field"] == "samples" and "more than the 100 s allowed" in error["message"]
-    monkeypatch.setattr("gaitswarm.api.dependencies.MOST_RANKED", 400)
+    monkeypatch.setattr("gaitswarm.api.routes.MOST_RANKED", 400)
     ranked = server.client.post(path, json={"drawn": 101})
     assert "drawn: must be at most 100 for the 4 evaluations" in ranked.json()["detail"]
     assert server.client.post(path, json={"drawn": 100}).status_code == 200

@@ -119,7 +119,7 @@ def test_a_table_is_fitted_shown_and_predicted_from(
     assert (efficiency["low"], efficiency["high"]) == (0.8, 0.95)
     assert [choice["name"] for choice in convention["choices"]] == ["signed", "absolute"]
     other = gaitswarm("targets", first, "--leave-one-out", "row", "--db", db)
-    assert other.code == 2 and "'target' or 'walk'" in other.err
+    assert other.code == 2 and "'target', 'walk'" in other.err
 
 
 def test_the_example_is_read_and_can_be_simulated() -> None:

@@ -1,0 +1,345 @@
+"""Operations: methods of `Jobs` that are requests of the REST API as well."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial, wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar, cast, get_type_hints
+
+from pydantic import BaseModel, Field, TypeAdapter, create_model
+from pydantic.fields import FieldInfo
+
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
+from gaitswarm.services.optimizer.views import Request
+from gaitswarm.specs import checked
+
+if TYPE_CHECKING:
+    from gaitswarm.services.monitoring.activity import Activity
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+Tag = Literal["core", "analysis", "robots", "operations"]
+Access = Literal["read", "submit", "command", "admin"]
+"""Permission that a token needs; `command`: to command the job of the path."""
+
+JobIdText = Annotated[
+    str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", examples=["k2q7zr5dm9xw"])
+]
+
+LARGEST_INDEX: Final = 2**31 - 1
+"""Largest index of an iteration in the database."""
+
+Index = Annotated[int, Field(ge=0, le=LARGEST_INDEX)]
+After = Annotated[str | None, Field(max_length=1000, description="`next` of the previous page.")]
+AfterIteration = Annotated[
+    int | None, Field(ge=0, le=LARGEST_INDEX, description="Only iterations with a greater index.")
+]
+PageLimit = Annotated[int, Field(ge=1, le=200)]
+SearchText = Annotated[str, Field(max_length=200)]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one request may compute.
+
+    Attributes:
+        simulated: Length of all simulations [s].
+        logged: The same, of simulations with logs [s].
+        sampled: The same, of samples of designs [s].
+        ranked: Evaluations times preferences [1].
+    """
+
+    simulated: float = math.inf
+    logged: float = math.inf
+    sampled: float = math.inf
+    ranked: float = math.inf
+
+    def check(self, seconds: float, *, field: str, logged: bool = False) -> None:
+        """Reject simulations that are too long in total."""
+        advice = f"allowed{' with logs' if logged else ''}; choose fewer scenarios or cycles"
+        limit = self.logged if logged else self.simulated
+        _check_length("the simulations", seconds, limit, advice, field)
+
+    def check_sampled(self, seconds: float) -> None:
+        """Reject samples of designs whose simulations are too long in total."""
+        advice = "allowed; choose fewer samples or scenarios"
+        designs = "the simulations of all designs"
+        _check_length(designs, seconds, self.sampled, advice, "samples")
+
+    def check_repeated(self, seconds: float) -> None:
+        """Reject repeated evaluations whose simulations are too long in total."""
+        evaluations = "the simulations of these evaluations"
+        _check_length(evaluations, seconds, self.sampled, "allowed; choose fewer", "replay")
+
+    def check_ranked(self, preferences: int, job: Job) -> None:
+        """Reject too many preferences for the evaluations of a job."""
+        evaluations = job.progress.evaluations
+        most = max(1.0, self.ranked / max(1, evaluations))
+        if preferences > most:
+            raise InvalidRequest(
+                f"must be at most {math.floor(most)} for the {evaluations} evaluations of this job",
+                field="drawn",
+            )
+
+
+def _check_length(what: str, seconds: float, limit: float, advice: str, field: str) -> None:
+    if seconds > limit:
+        text = f"{what} last {seconds:g} s in total, more than the {limit:g} s {advice}"
+        raise InvalidRequest(text, field=field)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a server adds to the arguments of an operation.
+
+    Attributes:
+        actor: Name of the client, for the audit log.
+        quota: Of the client's unfinished jobs.
+        check_priority: Raises Forbidden for a priority that the client may not set.
+        activity: Of the workers, in the process that runs jobs.
+        robots: Folders in which to look for meshes.
+    """
+
+    actor: str = LOCAL
+    quota: Quota | None = None
+    limits: Limits = Limits()
+    check_priority: Callable[[int], None] = lambda _: None
+    activity: Activity | None = None
+    robots: Sequence[Path] = ()
+
+
+@dataclass(frozen=True)
+class Docstring:
+    """The parts of a docstring: text, arguments, result, and errors by class name."""
+
+    text: str
+    arguments: Mapping[str, str]
+    result: str
+    errors: Mapping[str, str]
+
+
+_SECTION: Final = re.compile(r"\n\n?(Args|Returns|Raises):\n")
+_ENTRY: Final = re.compile(r"^    \*{0,2}(\w+): (.*(?:\n {5,}.*)*)", re.MULTILINE)
+
+
+def docstring_of(function: Callable[..., Any]) -> Docstring:
+    """Split a docstring into its sections."""
+    text, *parts = _SECTION.split(inspect.getdoc(function) or "")
+    sections = dict(zip(parts[::2], parts[1::2], strict=True))
+    entries = {
+        name: {key: " ".join(entry.split()) for key, entry in _ENTRY.findall(section)}
+        for name, section in sections.items()
+    }
+    return Docstring(
+        text.strip(),
+        entries.get("Args", {}),
+        " ".join(sections.get("Returns", "").split()),
+        entries.get("Raises", {}),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """A method of `Jobs` and its request.
+
+    The arguments that the path does not name are the query of a GET. Otherwise they are the body:
+    a model of that name, or of that class; without `body`, the only one is the whole body.
+
+    Attributes:
+        function: Computes the answer in this process.
+        path: Under the prefix of the API.
+        summary: A few words.
+        id: OpenAPI operation id.
+        heavy: Whether it simulates or reads whole histories; a server limits how many run.
+        access: Permission that a token needs.
+        status: Of a successful response.
+        media_type: Of answers that are bytes.
+        media_types: By `format`, of answers that are streams of bytes.
+        filename: Name of the download, with arguments.
+        cached: Whether clients cache the bytes by their ETag.
+        location: Path of what the operation creates, given its answer.
+        page: Whether only the web page uses it.
+    """
+
+    function: Callable[..., Any]
+    method: str
+    path: str
+    tag: Tag
+    summary: str
+    id: str
+    heavy: bool = False
+    access: Access = "read"
+    status: int = 200
+    body: str | type[BaseModel] | None = None
+    media_type: str = BINARY
+    media_types: Mapping[str, str] = field(default_factory=dict)
+    filename: str | None = None
+    cached: bool = False
+    location: Callable[[Any], str] | None = None
+    page: bool = False
+
+    @property
+    def reads(self) -> bool:
+        """Whether it changes nothing, so that a client may send it again."""
+        return self.method == "GET" or self.access == "read"
+
+    @cached_property
+    def docstring(self) -> Docstring:
+        return docstring_of(self.function)
+
+    @cached_property
+    def signature(self) -> inspect.Signature:
+        return inspect.signature(self.function)
+
+    @cached_property
+    def hints(self) -> dict[str, Any]:
+        """Types of the arguments, and of the answer as `return`."""
+        return get_type_hints(self.function, include_extras=True)
+
+    @property
+    def result(self) -> Any:
+        """Type of the answer."""
+        return self.hints["return"]
+
+    @cached_property
+    def adapter(self) -> TypeAdapter[Any]:
+        """Reads and writes the answer as JSON."""
+        return TypeAdapter(self.result)
+
+    @cached_property
+    def path_names(self) -> tuple[str, ...]:
+        """Parameters of the path."""
+        return tuple(re.findall(r"\{(\w+)\}", self.path))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Arguments that the path does not name."""
+        _, *names = self.signature.parameters
+        return tuple(name for name in names if name not in self.path_names)
+
+    @cached_property
+    def is_whole(self) -> bool:
+        """Whether one argument is the whole body."""
+        return self.method != "GET" and self.body is None and bool(self.names)
+
+    @cached_property
+    def request(self) -> Any:
+        """Model of the query or the body; None for neither."""
+        if not self.names:
+            return None
+        if self.is_whole:
+            return self.hints[self.names[0]]
+        if isinstance(self.body, type):
+            return self.body
+        fields = dict(map(self._field, self.names))
+        base = BaseModel if self.body is None else Request
+        name = self.body or f"{self.id}_query"
+        return create_model(name, __base__=base, __doc__=f"{self.summary}.", **fields)
+
+    def _field(self, name: str) -> tuple[str, Any]:
+        """Return name, type and default of an argument in the request."""
+        default = self.signature.parameters[name].default
+        hint = self.hints[name]
+        if name == "job_ids":
+            # The path has the first one.
+            limits = [part for part in hint.__metadata__ if isinstance(part, FieldInfo)]
+            return "also", (Annotated[list[JobIdText], *limits], [])
+        described = Field(description=self.docstring.arguments.get(name))
+        annotation = Annotated[hint, described] if described.description else hint
+        return name, (annotation, ... if default is inspect.Parameter.empty else default)
+
+    @property
+    def is_optional(self) -> bool:
+        """Whether a request may have no body."""
+        return isinstance(self.body, str) and not any(
+            entry.is_required() for entry in self.request.model_fields.values()
+        )
+
+    def validated(self, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], BaseModel | None]:
+        """Split arguments into parameters of the path and the request.
+
+        Raises InvalidRequest that names the argument.
+        """
+        given = dict(arguments)
+        if "job_ids" in given:
+            job_ids = given.pop("job_ids")
+            if isinstance(job_ids, str) or not job_ids:
+                raise InvalidRequest("must be a list of at least one id", field="job_ids")
+            given["job_id"], *given["also"] = job_ids
+        path = {name: given.pop(name) for name in self.path_names}
+        if self.request is None:
+            return path, None
+        if self.is_whole:
+            return path, given[self.names[0]]
+        try:
+            return path, checked(self.request, given)
+        except InvalidRequest as error:
+            if not error.field.startswith("also"):
+                raise
+            message = str(error).removeprefix(f"{error.field}: ")
+            raise InvalidRequest(f"{message}, after the first", field="job_ids") from error
+
+    def arguments(self, path: Mapping[str, Any], request: Any) -> dict[str, Any]:
+        """Return the arguments of the function for a validated request."""
+        if self.is_whole:
+            return {**path, self.names[0]: request}
+        given = {**path}
+        if request is not None:
+            given |= {name: getattr(request, name) for name in type(request).model_fields}
+        if "also" in given:
+            given["job_ids"] = [given.pop("job_id"), *given.pop("also")]
+        return given
+
+
+OPERATIONS: Final[list[Operation]] = []
+"""All operations that have been imported."""
+
+
+def operation(tag: Tag, route: str, id: str, summary: str, **options: Any) -> Callable[[F], F]:  # noqa: A002
+    """Make a method of `Jobs`, or a function of them, an operation.
+
+    Its body computes the answer in a process that has the database; jobs behind a server send a
+    request instead. The docstring documents both: its text describes the operation, "Args" the
+    parameters, "Returns" the answer, and "Raises" the statuses of errors.
+
+    Args:
+        tag: Chapter of the OpenAPI document.
+        route: Method and path.
+        id: OpenAPI operation id.
+        summary: A few words.
+        **options: Other attributes of `Operation`.
+    """
+    method, path = route.split()
+
+    def add(function: F) -> F:
+        made = Operation(function, method, path, tag, summary, id, **options)
+        OPERATIONS.append(made)
+
+        @wraps(function)
+        def call(jobs: Any, *arguments: Any, **named: Any) -> Any:
+            bound = made.signature.bind(jobs, *arguments, **named)
+            bound.apply_defaults()
+            _, *given = bound.arguments.items()
+            named = dict(given)
+            rest = named.pop("options", {})
+            return jobs._answer(made, named | rest)  # noqa: SLF001
+
+        call.operation = made  # type: ignore[attr-defined]
+        return cast(F, call)
+
+    return add
+
+
+core = partial(operation, "core")
+analysis = partial(operation, "analysis", heavy=True)
+robots = partial(operation, "robots")
+operations = partial(operation, "operations")

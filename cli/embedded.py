@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import Parts, Printed, note, show
-from gaitswarm.cli.progress import show_progress
+from gaitswarm.cli.progress import Progress, show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, worth
 from gaitswarm.designs import SimulationRequest
 from gaitswarm.jobs.database import DatabaseJobs
@@ -34,55 +34,56 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.simulation import run_simulation
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.inputs.options import WorkerOptions
-    from gaitswarm.cli.progress import Progress
+    from gaitswarm.cli.options import WorkerOptions
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
     from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
-    from gaitswarm.services.optimizer.store import Store
-    from gaitswarm.settings import Settings
     from gaitswarm.simulation import SimulationView
     from gaitswarm.views.job import JobView
 
 
-def resumed_job(
-    service: JobService, job_id: str, spec: Spec | None, *, accept_changes: bool
-) -> Job:
-    """Return an earlier job, ready to run; raise Conflict if it cannot be resumed.
-
-    spec: if given again, it must be that of the job.
-    """
-    if spec is not None:
-        check_same(service.job(job_id).spec, spec, job_id)
-    return taken_up(service, job_id, accept_changes=accept_changes)
-
-
 class Embedded:
-    """Workers of this process, opened when a job needs them.
+    """A database whose jobs run in this process, and workers opened when a job needs them.
 
     accepts_changes: whether jobs may resume after changes of code, robot or compiler.
     """
 
-    def __init__(self, settings: Settings, *, accepts_changes: bool = False) -> None:
+    def __init__(self, workers: WorkerOptions, *, accepts_changes: bool = False) -> None:
+        self._settings = read_settings(**asdict(workers))
         # Fail before a job is stored: workers are opened only for the first job.
-        check_address(settings.ray_address)
-        self._settings = settings
+        check_address(self._settings.ray_address)
+        url = database_to_write(self._settings)
+        self.database = masked_url(url)
+        self.store = open_store(url)
+        self.service = JobService(self.store)
+        self.jobs = DatabaseJobs(self.service, url)
         self._accepts_changes = accepts_changes
         self._evaluator: Evaluator | None = None
 
-    def run(self, jobs: DatabaseJobs, store: Store, job: Job, claim: Claim | None = None) -> bool:
+    def resumed(self, job_id: str, spec: Spec | None) -> Job:
+        """Return an earlier job, ready to run; raise Conflict if it cannot be resumed.
+
+        spec: if given again, it must be that of the job.
+        """
+        if spec is not None:
+            check_same(self.service.job(job_id).spec, spec, job_id)
+        return taken_up(self.service, job_id, accept_changes=self._accepts_changes)
+
+    def run(self, job: Job, claim: Claim | None = None) -> bool:
         """Run a job, or follow another process that runs it; return whether a signal came."""
         stop = threading.Event()
         with (
             stop_on_signals(stop),
             show_progress(
-                particles=job.spec.optimizer.particles,
-                iterations_planned=job.spec.iterations,
-                evaluations_planned=job.spec.budget,
-                iterations=job.progress.iterations,
-                evaluations=job.progress.evaluations,
+                Progress(
+                    particles=job.spec.optimizer.particles,
+                    iterations_planned=job.spec.iterations,
+                    evaluations_planned=job.spec.budget,
+                    iterations=job.progress.iterations,
+                    evaluations=job.progress.evaluations,
+                )
             ) as progress,
         ):
             best = job.progress.best_fitness
@@ -103,7 +104,7 @@ class Embedded:
 
             try:
                 ended = run_embedded(
-                    store,
+                    self.store,
                     lambda: self._opened(progress, stop),
                     job.id if claim is None else claim,
                     on_commit=committed,
@@ -118,16 +119,43 @@ class Embedded:
                     followed_iterations=job.progress.iterations,
                 )
             except Exception as error:
-                error.add_note(_resume_hint(job.id, jobs.place))
+                error.add_note(_resume_hint(job.id, self.jobs.place))
                 raise
             if not stop.is_set():
-                note_reference(store, ended)
+                note_reference(self.store, ended)
         return stop.is_set()
+
+    def run_to_end(self, spec: Spec, *, any_budget: bool = False) -> Job:
+        """Run an earlier job of the same spec, or a new one, to its end.
+
+        any_budget: accept a job of another budget, extended if it is smaller.
+
+        Raises JobEnded if it does not succeed, and KeyboardInterrupt after a signal.
+        """
+        service, claim = self.service, None
+        job = earlier_job(service, spec, any_budget=any_budget)
+        if job is not None and job.spec.budget < spec.budget:
+            job = service.extend(job.id, max(spec.iterations, job.spent + 1))
+        if job is None:
+            claim = service.submit_embedded(spec)
+            job = claim.job
+        elif job.state is not JobState.SUCCEEDED:
+            job = taken_up(service, job.id, accept_changes=False)
+        if job.state is JobState.SUCCEEDED:
+            return job
+        note(f"job {job.id}: {spec.name}")
+        if self.run(job, claim):
+            note("stopped; to resume, run the same command")
+            raise KeyboardInterrupt
+        job = self.store.job(job.id)
+        if job.state is not JobState.SUCCEEDED:
+            raise ended(self.jobs.job(job.id), self.jobs.place)
+        return job
 
     def close(self) -> None:
         if self._evaluator is not None:
             self._evaluator.close()
-            self._evaluator = None
+        self.store.close()
 
     def _opened(self, progress: Progress, stop: threading.Event) -> Evaluator:
         if self._evaluator is None:
@@ -138,41 +166,6 @@ class Embedded:
                 kind, address=address, cpus=self._settings.cpus, should_stop=stop.is_set
             )
         return self._evaluator
-
-
-def job_run(
-    spec: Spec,
-    store: Store,
-    jobs: DatabaseJobs,
-    embedded: Embedded,
-    *,
-    any_budget: bool = False,
-) -> Job:
-    """Run an earlier job of the same spec, or a new one, to its end.
-
-    any_budget: accept a job of another budget, extended if it is smaller.
-
-    Raises JobEnded if it does not succeed, and KeyboardInterrupt after a signal.
-    """
-    service, claim = JobService(store), None
-    job = earlier_job(service, spec, any_budget=any_budget)
-    if job is not None and job.spec.budget < spec.budget:
-        job = service.extend(job.id, max(spec.iterations, job.spent + 1))
-    if job is None:
-        claim = service.submit_embedded(spec)
-        job = claim.job
-    elif job.state is not JobState.SUCCEEDED:
-        job = taken_up(service, job.id, accept_changes=False)
-    if job.state is JobState.SUCCEEDED:
-        return job
-    note(f"job {job.id}: {spec.name}")
-    if embedded.run(jobs, store, job, claim):
-        note("stopped; to resume, run the same command")
-        raise KeyboardInterrupt
-    job = store.job(job.id)
-    if job.state is not JobState.SUCCEEDED:
-        raise ended(jobs.job(job.id), jobs.place)
-    return job
 
 
 def run_seeds(
@@ -186,21 +179,18 @@ def run_seeds(
 
     report_command: the command that prints the report later, for users who interrupt.
     """
-    settings = read_settings(**asdict(workers))
-    url = database_to_write(settings)
-    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
-        service = JobService(store)
-        jobs = DatabaseJobs(service, url)
-        submitted = [service.submit(spec)[0] for spec in specs]
+    with closing(Embedded(workers)) as embedded:
+        jobs = embedded.jobs
+        submitted = [embedded.service.submit(spec)[0] for spec in specs]
         ids = [job.id for job in submitted]
         for number, job in enumerate(submitted, start=1):
-            note(f"run {number} of {len(specs)}: job {job.id} in database {masked_url(url)}")
-            if embedded.run(jobs, store, job):
+            note(f"run {number} of {len(specs)}: job {job.id} in database {embedded.database}")
+            if embedded.run(job):
                 rest = [f"  gaitswarm optimize --resume {i}{jobs.place}" for i in ids[number - 1 :]]
                 last = f"  gaitswarm {report_command} {' '.join(ids)}{jobs.place}"
                 note("\n".join(["stopped; to resume, run", *rest, last]))
                 raise KeyboardInterrupt
-            ended = store.job(job.id)
+            ended = embedded.store.job(job.id)
             if ended.state is not JobState.SUCCEEDED:
                 note(f"job {job.id} is {ended.state}: {ended.error or 'no reason given'}")
         return report(jobs, ids)

@@ -34,7 +34,7 @@ from gaitswarm.cli.commands import (
     serve,
 )
 from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
-from gaitswarm.cli.inputs.options import expanded
+from gaitswarm.cli.options import expanded
 from gaitswarm.cli.output import (
     OutputClosed,
     Stdout,

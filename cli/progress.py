@@ -6,8 +6,8 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
 
 from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import note, stderr_console
@@ -15,7 +15,6 @@ from gaitswarm.cli.tables import duration, number
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
-    from rich.progress import TaskID
 
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.views.job import Spent, StateView
@@ -24,63 +23,102 @@ _LINE_SECONDS: Final = 2.0
 """Minimum interval of lines; the last iteration is always printed."""
 
 
-_LABELS: Final = {"iterations": "iteration", "designs": "design"}
+@dataclass(slots=True)
+class Progress:
+    """Display of committed iterations.
 
+    Attributes:
+        particles: maximum of designs per iteration.
+        iterations, evaluations: already committed.
+        bar: on a terminal.
+    """
 
-class Progress(Protocol):
-    """Display of committed iterations."""
+    particles: int
+    iterations_planned: int
+    evaluations_planned: int
+    iterations: int = 0
+    evaluations: int = 0
+    bar: Bar | None = None
+    _seen: int = field(default=0, init=False)
+    _seconds: float = field(default=0.0, init=False)
+    _next_line: float = field(default=0.0, init=False)
+
+    @property
+    def spent(self) -> Spent:
+        from gaitswarm.views.job import budget_spent
+
+        return budget_spent(
+            self.iterations,
+            self.evaluations,
+            particles=self.particles,
+            iterations_planned=self.iterations_planned,
+            evaluations_planned=self.evaluations_planned,
+        )
 
     def iteration(
         self, index: int, designs: int, best_so_far: float | None, seconds: float
     ) -> None:
         """Show an iteration of so many designs, evaluated in so many seconds."""
+        self.iterations = index + 1
+        self.evaluations += designs
+        self._seen += designs
+        self._seconds += seconds
+        rate = self._seen / max(self._seconds, 1e-9)
+        left = duration(max(0, self.evaluations_planned - self.evaluations) / rate)
+        spent, best, speed = self.spent, number(best_so_far), f"{rate:.1f} evaluations/s"
+        if self.bar is not None:
+            self.bar.update(
+                self.bar.task_ids[0],
+                description=spent.unit.removesuffix("s"),
+                completed=spent.done,
+                total=spent.planned,
+                best=f"best {best}",
+                rate=speed,
+                left=f"{left} left",
+            )
+            return
+        now = time.monotonic()
+        if now < self._next_line and self.evaluations < self.evaluations_planned:
+            return
+        self._next_line = now + _LINE_SECONDS
+        done = f"{spent.done}/{spent.planned} {spent.unit}"
+        if spent.unit != "iterations":
+            done = f"{index + 1} iterations, {done}"
+        note(f"{done}: best {best}, {speed}, {left} left")
 
     def remark(self, text: str) -> None:
         """Show a line of text."""
+        if self.bar is None:
+            note(text)
+        else:
+            self.bar.console.print(text, markup=False)
 
 
 @contextmanager
-def show_progress(
-    *,
-    particles: int,
-    iterations_planned: int,
-    evaluations_planned: int,
-    iterations: int = 0,
-    evaluations: int = 0,
-) -> Iterator[Progress]:
-    """Show progress of one job on stderr.
-
-    particles: maximum of designs per iteration. iterations, evaluations: already committed.
-    """
-    pace = _Pace(particles, iterations_planned, evaluations_planned, iterations, evaluations)
+def show_progress(progress: Progress) -> Iterator[Progress]:
+    """Show progress of one job on stderr inside the block."""
     console = stderr_console()
     if not console.is_terminal:
-        yield _Lines(pace)
+        yield progress
         return
 
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import Progress as RichProgress
 
-    bar = RichProgress(
+    progress.bar = RichProgress(
         TextColumn("{task.description}"),
         MofNCompleteColumn(),
         BarColumn(),
-        TextColumn("best {task.fields[best]}"),
-        TextColumn("{task.fields[rate]}"),
-        TextColumn("{task.fields[left]}"),
+        *(TextColumn(f"{{task.fields[{name}]}}") for name in ("best", "rate", "left")),
         console=console,
     )
-    with bar:
-        spent = pace.spent
-        task = bar.add_task(
-            _LABELS[spent.unit],
-            total=spent.planned,
-            completed=spent.done,
-            best="–",
-            rate="",
-            left="",
+    spent = progress.spent
+    with progress.bar:
+        unit = spent.unit.removesuffix("s")
+        progress.bar.add_task(
+            unit, total=spent.planned, completed=spent.done, best="", rate="", left=""
         )
-        yield _Live(bar, task, pace)
+        yield progress
 
 
 def watch_with_progress(jobs: Jobs, job_id: str) -> None:
@@ -89,9 +127,7 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
 
     job = jobs.job(job_id)
     with show_progress(
-        particles=job.spec.optimizer.particles,
-        iterations_planned=job.iterations_planned,
-        evaluations_planned=job.evaluations_planned,
+        Progress(job.spec.optimizer.particles, job.iterations_planned, job.evaluations_planned)
     ) as progress:
         last: StateView | None = None
         for event in jobs.follow(job_id):
@@ -125,89 +161,3 @@ def _check_success(last: StateView | None) -> None:
         return
     reason = f": {last.error}" if last.error else ""
     raise JobEnded(f"job {last.id} {last.state.value}{reason}")
-
-
-@dataclass(slots=True)
-class _Pace:
-    """Budget spent, evaluation rate and remaining time."""
-
-    particles: int
-    iterations_planned: int
-    evaluations_planned: int
-    iterations: int
-    evaluations: int
-    seen: int = 0
-    seconds: float = 0.0
-
-    @property
-    def spent(self) -> Spent:
-        from gaitswarm.views.job import budget_spent
-
-        return budget_spent(
-            self.iterations,
-            self.evaluations,
-            particles=self.particles,
-            iterations_planned=self.iterations_planned,
-            evaluations_planned=self.evaluations_planned,
-        )
-
-    @property
-    def ended(self) -> bool:
-        return self.evaluations >= self.evaluations_planned
-
-    def add(self, index: int, designs: int, seconds: float) -> tuple[float, float]:
-        """Add an iteration; return evaluations per second and seconds left."""
-        self.iterations = index + 1
-        self.evaluations += designs
-        self.seen += designs
-        self.seconds += seconds
-        rate = self.seen / max(self.seconds, 1e-9)
-        return rate, max(0, self.evaluations_planned - self.evaluations) / rate
-
-
-class _Live:
-    def __init__(self, bar: Bar, task: TaskID, pace: _Pace) -> None:
-        self._bar = bar
-        self._task = task
-        self._pace = pace
-
-    def iteration(
-        self, index: int, designs: int, best_so_far: float | None, seconds: float
-    ) -> None:
-        rate, left = self._pace.add(index, designs, seconds)
-        spent = self._pace.spent
-        self._bar.update(
-            self._task,
-            description=_LABELS[spent.unit],
-            completed=spent.done,
-            total=spent.planned,
-            best=number(best_so_far),
-            rate=f"{rate:.1f} evaluations/s",
-            left=f"{duration(left)} left",
-        )
-
-    def remark(self, text: str) -> None:
-        self._bar.console.print(text, markup=False)
-
-
-class _Lines:
-    def __init__(self, pace: _Pace) -> None:
-        self._pace = pace
-        self._next = 0.0
-
-    def iteration(
-        self, index: int, designs: int, best_so_far: float | None, seconds: float
-    ) -> None:
-        rate, left = self._pace.add(index, designs, seconds)
-        now = time.monotonic()
-        if now < self._next and not self._pace.ended:
-            return
-        self._next = now + _LINE_SECONDS
-        spent = self._pace.spent
-        done = f"{spent.done}/{spent.planned} {spent.unit}"
-        if spent.unit != "iterations":
-            done = f"{index + 1} iterations, {done}"
-        note(f"{done}: best {number(best_so_far)}, {rate:.1f} evaluations/s, {duration(left)} left")
-
-    def remark(self, text: str) -> None:
-        note(text)

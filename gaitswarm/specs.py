@@ -187,9 +187,10 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     document = _folder_defaults(options.get("robot"), document | given) | document
     file = None
     if isinstance(given.get("start"), str | os.PathLike):
-        source = start_from(given["start"])
-        file = source if isinstance(source, StartFile) else None
-        given["start"] = source.designs if isinstance(source, StartFile) else source
+        given["start"] = start_from(given["start"])
+    if isinstance(given.get("start"), StartFile):
+        file = given["start"]
+        given["start"] = file.designs
     document |= given
     try:
         return SPECS.validate_python(document)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from gaitswarm.cli.exit_codes import CheckFailed
-from gaitswarm.cli.inputs.options import Db, Json, Precision, completed, one_of
+from gaitswarm.cli.options import Db, Json, Precision, completed, one_of
 from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest

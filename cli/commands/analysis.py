@@ -13,7 +13,7 @@ import typer
 
 from gaitswarm.cli.commands.designs import Radius, Samples, Seed, shown_progress
 from gaitswarm.cli.files import replacing
-from gaitswarm.cli.inputs.options import JobId, Json, Place, Precision
+from gaitswarm.cli.options import JobId, Json, Place, Precision
 from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -60,7 +60,7 @@ def rank(
     jobs: Jobs,
 ) -> Printed:
     """Rank a job's stored designs by another preference, without simulation."""
-    from gaitswarm.cli.inputs.spec_file import preference_choice
+    from gaitswarm.cli.inputs import preference_choice
 
     ranking = jobs.ranking(job_id, preference_choice(preference), top=top)
     return ranking, _ranking(ranking)

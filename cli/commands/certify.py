@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 
 import typer
 
 from gaitswarm.cli.commands.designs import without_logs
-from gaitswarm.cli.inputs.options import (
+from gaitswarm.cli.options import (
     ControllerOption,
     JobName,
     Place,
@@ -126,12 +125,7 @@ def certify(
     one seed, world K is the same for every design. Run the same command to resume; with more
     worlds, only the missing ones are simulated.
     """
-    from gaitswarm.cli.embedded import Embedded, job_run
-    from gaitswarm.jobs.database import DatabaseJobs
-    from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.services.optimizer.service import JobService
-    from gaitswarm.services.runtime import open_store
-    from gaitswarm.settings import read_settings
+    from gaitswarm.cli.embedded import Embedded
 
     values = {
         "worlds": worlds,
@@ -152,13 +146,10 @@ def certify(
         return _replayed(spec, replay, log)
     if log is not None:
         raise InvalidRequest("requires --replay", field="log")
-    settings = read_settings(**asdict(workers))
-    url = database_to_write(settings)
-    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
-        jobs = DatabaseJobs(JobService(store), url)
-        job = job_run(spec, store, jobs, embedded, any_budget=True)
-        view = jobs.certificate(job.id, worlds=spec.worlds, most=most)
-    return view, _parts(view, jobs.place)
+    with closing(Embedded(workers)) as embedded:
+        job = embedded.run_to_end(spec, any_budget=True)
+        view = embedded.jobs.certificate(job.id, worlds=spec.worlds, most=most)
+        return view, _parts(view, embedded.jobs.place)
 
 
 _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
@@ -167,8 +158,7 @@ _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 
 def _certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> CertificateSpec:
     """Return the spec of a design and options, or of an earlier certificate with options."""
-    from gaitswarm.cli.inputs.robots import chosen_robot, scenario_data
-    from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.cli.inputs import chosen_robot, parse_spec, scenario_data
 
     options = {name: value for name, value in given.items() if value is not None}
     document = _earlier(design, db, options) or _new(design, db, options)
@@ -189,7 +179,7 @@ def _certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> 
 
 def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any] | None:
     """Return the document of a certificate named by its id; None for any other design."""
-    from gaitswarm.cli.inputs.design_file import may_be_file
+    from gaitswarm.cli.inputs import may_be_file
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 
     if may_be_file(design):
@@ -210,8 +200,7 @@ def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[st
 
 
 def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
-    from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios, robot_defaults
+    from gaitswarm.cli.inputs import chosen_robot, chosen_scenarios, given_design, robot_defaults
     from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_walks
 
     robot = options.get("robot")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gaitswarm.cli.inputs.options import (
+from gaitswarm.cli.options import (
     ControllerOption,
     Place,
     Precision,
@@ -33,7 +33,7 @@ from gaitswarm.cli.tables import (
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.inputs.design_file import GivenDesign
+    from gaitswarm.cli.inputs import GivenDesign
     from gaitswarm.firmware import FirmwareView
     from gaitswarm.robustness_index import Progress, RobustnessRequest, RobustnessView
     from gaitswarm.sim.drives import NamedDrive, WalkFigures
@@ -81,9 +81,7 @@ def simulate(
     """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
     from pydantic import ValidationError
 
-    from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
-    from gaitswarm.cli.inputs.spec_file import json_object
+    from gaitswarm.cli.inputs import given_design, json_object, robot_defaults, scenario_data
     from gaitswarm.designs import SimulationRequest
     from gaitswarm.errors import invalid_request
     from gaitswarm.simulation import run_simulation
@@ -161,7 +159,7 @@ def compare(
     place: Place,
 ) -> Printed:
     """Compare drives in the same scenarios: speed, power, effectivity, objectives."""
-    from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios
+    from gaitswarm.cli.inputs import chosen_robot, chosen_scenarios
     from gaitswarm.sim.drives import DRIVES
     from gaitswarm.sim.drives import compare as compare_drives
 
@@ -176,7 +174,7 @@ def compare(
 
 
 def _drive(name: str, place: Place) -> NamedDrive:
-    from gaitswarm.cli.inputs.design_file import given_design, read_design
+    from gaitswarm.cli.inputs import given_design, read_design
     from gaitswarm.sim.controllers import CONTROLLERS
     from gaitswarm.sim.drives import drive_of_design, find_drive
 
@@ -252,7 +250,7 @@ class SampleOptions:
         """Return the request for a design; a job's best uses the job's scenarios and robot."""
         from pydantic import ValidationError
 
-        from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
+        from gaitswarm.cli.inputs import robot_defaults, scenario_data
         from gaitswarm.errors import invalid_request
         from gaitswarm.robustness_index import RobustnessRequest
 
@@ -299,7 +297,7 @@ def robustness(
     It is the norm of the Jacobian of the objectives' logarithms with respect to the variables as
     shares of their bounds, from a regression over designs sampled around the given one.
     """
-    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs import given_design
 
     given = given_design(design, options.controller, robot=options.robot, place=place)
     view = estimate(options.request(given))
@@ -396,8 +394,7 @@ def firmware(
     place: Place,
 ) -> Printed:
     """Write a design as C for the robot's microcontrollers, with a test against simulations."""
-    from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.cli.inputs import chosen_scenarios, given_design
     from gaitswarm.firmware import write_firmware
 
     given = given_design(design, controller, robot=robot, place=place)

@@ -10,7 +10,7 @@ import typer
 
 from gaitswarm.cli.exit_codes import CheckFailed
 from gaitswarm.cli.files import replacing
-from gaitswarm.cli.inputs.options import JobId, Json, Place, full_id
+from gaitswarm.cli.options import JobId, Json, Place, full_id
 from gaitswarm.cli.output import Parts, note, show
 from gaitswarm.cli.tables import number, table
 from gaitswarm.cli.tables import place as place_of

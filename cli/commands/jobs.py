@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gaitswarm.cli.inputs.options import (
+from gaitswarm.cli.options import (
     AcceptChanges,
     JobId,
     JobIds,
@@ -45,7 +45,7 @@ def submit(
     place: Place,
 ) -> Printed:
     """Queue a job for a running server; `optimize` runs one in this process."""
-    from gaitswarm.cli.inputs.spec_file import build_spec
+    from gaitswarm.cli.inputs import build_spec
 
     spec = build_spec(options)
     with place.open(create=True) as jobs:
@@ -330,8 +330,12 @@ def fork(
     jobs: Jobs,
 ) -> Printed:
     """Queue a job that starts with iterations of another; omitted options keep its values."""
-    from gaitswarm.cli.inputs.robots import chosen_robot, scenario_data
-    from gaitswarm.cli.inputs.spec_file import optimizer_choice, preference_choice
+    from gaitswarm.cli.inputs import (
+        chosen_robot,
+        optimizer_choice,
+        preference_choice,
+        scenario_data,
+    )
     from gaitswarm.cli.tables import lineage_line
 
     values = {

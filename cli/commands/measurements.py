@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 import typer
 
 from gaitswarm.cli.files import replacing
-from gaitswarm.cli.inputs.options import (
+from gaitswarm.cli.options import (
     ControllerOption,
     JobIds,
     JobName,
@@ -65,8 +65,7 @@ class WalkOptions:
 
     def read(self, place: Place) -> MeasuredWalk:
         """Return the walk; a job's best uses the job's robot by default."""
-        from gaitswarm.cli.inputs.design_file import given_design
-        from gaitswarm.cli.inputs.robots import one_scenario
+        from gaitswarm.cli.inputs import given_design, one_scenario
         from gaitswarm.sim.measurement.measured_log import MeasuredWalk
         from gaitswarm.sim.robot import load_robot
 
@@ -188,8 +187,7 @@ def identify(
 ) -> Printed:
     """Fit a robot's parameters to recorded walks in this process, and show which are reliable."""
     from gaitswarm.cli.embedded import run_seeds
-    from gaitswarm.cli.inputs.robots import chosen_robot
-    from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.cli.inputs import chosen_robot, parse_spec
 
     true_values = read_truth(truth)
     document = {
@@ -251,7 +249,7 @@ ONE_RUN: Final = "note: a single run always converges; runs with other seeds sho
 
 def read_truth(path: Path | None) -> dict[str, float]:
     """Read true values by name; none without a file."""
-    from gaitswarm.cli.inputs.spec_file import read_json_object
+    from gaitswarm.cli.inputs import read_json_object
 
     values = {} if path is None else read_json_object(path, "truth")
     for name, value in values.items():
@@ -471,8 +469,8 @@ def calibrate(
 ) -> Printed:
     """Fit a robot and unknown conventions to a table of results, in this process."""
     from gaitswarm.cli.embedded import run_seeds
-    from gaitswarm.cli.inputs.spec_file import parse_spec
-    from gaitswarm.cli.inputs.targets_file import read_targets
+    from gaitswarm.cli.inputs import parse_spec
+    from gaitswarm.cli.targets_file import read_targets
 
     document: dict[str, Any] = {
         "kind": "calibration",
@@ -569,7 +567,7 @@ def _calibrated(reached: TargetsView, parameters: IdentifiabilityView) -> Parts:
 
 def _robots(text: str | None) -> dict[str, Any]:
     """Return the spec's field of one robot, or of several shipped ones."""
-    from gaitswarm.cli.inputs.robots import chosen_robot
+    from gaitswarm.cli.inputs import chosen_robot
 
     if text is None or text.lstrip().startswith("{") or "," not in text:
         return {"robot": chosen_robot(text)}
@@ -577,7 +575,7 @@ def _robots(text: str | None) -> dict[str, Any]:
 
 
 def _variables(document: dict[str, Any], text: str) -> list[Any]:
-    from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.cli.inputs import parse_spec
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
     entries = _entries(text)

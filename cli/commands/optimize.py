@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
-from gaitswarm.cli.inputs.options import (
+from gaitswarm.cli.options import (
     AcceptChanges,
     Json,
     SpecOptions,
@@ -46,14 +45,8 @@ def optimize(
     as_json: Json = False,
 ) -> None:
     """Run a job in this process. Ctrl-C stops it; --resume continues it."""
-    from gaitswarm.cli.embedded import Embedded, finish, job_run, resumed_job
-    from gaitswarm.cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
-    from gaitswarm.jobs.database import DatabaseJobs
-    from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.services.optimizer.masking import masked_url
-    from gaitswarm.services.optimizer.service import JobService
-    from gaitswarm.services.runtime import open_store
-    from gaitswarm.settings import read_settings
+    from gaitswarm.cli.embedded import Embedded, finish
+    from gaitswarm.cli.inputs import build_spec, by_other_optimizer, check_optimizer_name
 
     for option, value in {
         "compare-published": compare_published,
@@ -63,27 +56,20 @@ def optimize(
             raise InvalidRequest("cannot be combined with --json", field=option)
     if accept_changes and resume is None:
         raise InvalidRequest("requires --resume", field="accept-changes")
-    settings = read_settings(**asdict(workers))
     spec = build_spec(options) if resume is None or options.given else None
     if compare_optimizer is not None:
         check_optimizer_name(compare_optimizer, "compare-optimizer")
-    url = database_to_write(settings)
-    with (
-        closing(open_store(url)) as store,
-        closing(Embedded(settings, accepts_changes=accept_changes)) as embedded,
-    ):
-        service = JobService(store)
-        jobs = DatabaseJobs(service, url)
-        claim = None
+    with closing(Embedded(workers, accepts_changes=accept_changes)) as embedded:
+        jobs, claim = embedded.jobs, None
         if spec is not None and resume is None:
-            claim = service.submit_embedded(spec)
+            claim = embedded.service.submit_embedded(spec)
             job = claim.job
         else:
-            job = resumed_job(service, resume or "", spec, accept_changes=accept_changes)
-        note(f"job {job.id} in database {masked_url(url)}")
-        interrupted = embedded.run(jobs, store, job, claim)
+            job = embedded.resumed(resume or "", spec)
+        note(f"job {job.id} in database {embedded.database}")
+        interrupted = embedded.run(job, claim)
         others = {}
         if compare_optimizer is not None and not interrupted:
-            other = job_run(by_other_optimizer(job.spec, compare_optimizer), store, jobs, embedded)
+            other = embedded.run_to_end(by_other_optimizer(job.spec, compare_optimizer))
             others[compare_optimizer] = jobs.job(other.id)
         finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, others=others)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gaitswarm.cli.commands.designs import SampleOptions, estimate
-from gaitswarm.cli.inputs.options import JobId, Place
+from gaitswarm.cli.options import JobId, Place
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def surface(
     place: Place,
 ) -> None:
     """Draw the quantised output of a Fuzzy-PI design over angle error and motor current."""
-    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs import given_design
     from gaitswarm.cli.pictures import draw_surface, save
     from gaitswarm.sim.controllers import CONTROLLERS
     from gaitswarm.sim.controllers.surface import surface as surface_of
@@ -72,7 +72,7 @@ def robustness(
     place: Place,
 ) -> None:
     """Draw robustness indices of designs by scenario, with their intervals."""
-    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs import given_design
     from gaitswarm.cli.pictures import draw_robustness, save
 
     requests: dict[str, RobustnessRequest] = {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.inputs.options import RobotOption, one_of
+from gaitswarm.cli.options import RobotOption, one_of
 from gaitswarm.cli.output import Printed, note, print_text
 from gaitswarm.cli.tables import gait_in_words
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -156,7 +156,7 @@ def _mesh_summary(meshes: MeshCopies) -> str:
 
 
 def _files(folder: Path) -> RobotFiles:
-    from gaitswarm.cli.inputs.robots import chosen_robot
+    from gaitswarm.cli.inputs import chosen_robot
     from gaitswarm.sim.robot import RobotFiles
 
     if not folder.is_dir():
@@ -220,7 +220,7 @@ def gaits(
     ] = None,
 ) -> Printed:
     """List gaits: order of footfalls, supporting feet, static stability."""
-    from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
+    from gaitswarm.cli.inputs import chosen_robot, one_scenario
     from gaitswarm.gaits import planned_gaits
 
     view = planned_gaits(
@@ -280,7 +280,7 @@ def mjcf(
 
     Needs pip install 'gaitswarm[mujoco]'. To view it: python -m mujoco.viewer --mjcf=FILE.xml.
     """
-    from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
+    from gaitswarm.cli.inputs import chosen_robot, one_scenario
     from gaitswarm.sim.mujoco.engines import check_installed
     from gaitswarm.sim.robot import load_robot
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from gaitswarm.cli.inputs.options import RunnerOptions
+from gaitswarm.cli.options import RunnerOptions
 from gaitswarm.cli.output import note
 
 if TYPE_CHECKING:

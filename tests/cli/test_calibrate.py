@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.cli.inputs.targets_file import read_targets
+from gaitswarm.cli.targets_file import read_targets
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from tests.cli.conftest import Gaitswarm

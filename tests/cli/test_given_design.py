@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.cli.inputs.design_file import GivenDesign, given_design
-from gaitswarm.cli.inputs.options import Place
+from gaitswarm.cli.inputs import GivenDesign, given_design
+from gaitswarm.cli.options import Place
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store

@@ -280,7 +280,7 @@ def test_a_ranking_by_chapter_3_shows_fitness_and_figure_of_merit(
     ("options", "field"),
     [
         (("--preference", "D"), "preference"),
-        (("--preference", "{"), "preference: not JSON"),
+        (("--preference", "{"), "preference: is not valid JSON"),
         (("--preference", '{"bias": [0, 0, 0, 0, 0]}'), "preference.exponent"),
         (("--preference", "A", "--top", "0"), "top"),
     ],

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.cli.inputs.options import full_id
+from gaitswarm.cli.options import full_id
 from gaitswarm.jobs.open import open_jobs
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from tests.cli.conftest import Finished, Gaitswarm

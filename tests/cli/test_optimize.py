@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from gaitswarm.cli.exit_codes import ExitCode
-from gaitswarm.cli.inputs.spec_file import LARGEST_FILE
+from gaitswarm.cli.inputs import LARGEST_FILE
 from gaitswarm.services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.jobs import SMALL_SPEC
@@ -388,7 +388,7 @@ def test_an_invalid_cluster_address_leaves_no_job_behind(
     ("options", "said"),
     [
         (("--start-from", "FILE"), r"spec\.json is a file, .* its name must end in \.csv"),
-        (("--optimizer-settings", "[1]"), r"must be an object, \{\.\.\.\}, not a list"),
+        (("--optimizer-settings", "[1]"), r"must be one JSON object"),
     ],
 )
 def test_errors_of_options_name_the_allowed_values(

@@ -110,7 +110,7 @@ def test_an_error_in_a_robot_file_names_field_line_and_unit(
         ),
         ('{"contact_law": "glue"}', "robot.contact_law: must be 'linear_zone'"),
         (str(QUADRUPED.parent), "is not a robot's folder"),
-        ('{"name": ' * 5000, "robot: not JSON"),
+        ('{"name": ' * 5000, "robot: is nested too deeply"),
     ],
 )
 @pytest.mark.parametrize("command", [SIMULATE, ["optimize", "--iterations", "1", "--json"]])

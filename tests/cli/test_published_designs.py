@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.cli.embedded import published_results
-from gaitswarm.cli.inputs.design_file import read_design
+from gaitswarm.cli.inputs import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.reference import adapted_to_job

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from gaitswarm.cli.inputs.design_file import read_design
+from gaitswarm.cli.inputs import read_design
 from tests.examples.walks import SHORT_WALK
 from tests.library.conftest import Reach
 

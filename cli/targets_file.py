@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.cli.inputs.design_file import read_design
-from gaitswarm.cli.inputs.spec_file import read_json_object
+from gaitswarm.cli.inputs import read_design, read_json_object
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:

@@ -1,1 +1,0 @@
-"""Inputs of commands: options, specs, designs, robots."""

@@ -19,8 +19,7 @@ from gaitswarm.api.middleware import BodyLimitMiddleware, OriginMiddleware, Resp
 from gaitswarm.api.page import MANUAL_FOLDER, PAGE_FOLDER, add_manual, add_page
 from gaitswarm.api.problems import add_problem_handlers
 from gaitswarm.services.monitoring.activity import Activity
-from gaitswarm.services.monitoring.collectors import QueueCollector
-from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.monitoring.metrics import Metrics, QueueCollector
 from gaitswarm.services.optimizer.jobs.provenance import installed_version
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings

@@ -157,7 +157,7 @@ def open_runtime(
         store = open_store(database)
         stack.callback(store.close)
         if metrics is not None:
-            from gaitswarm.services.monitoring.store_metrics import StoreMetrics  # noqa: PLC0415
+            from gaitswarm.services.monitoring.metrics import StoreMetrics  # noqa: PLC0415
 
             store.observers.append(StoreMetrics(metrics))
         if tracing is not None:
@@ -186,7 +186,7 @@ def open_runtime(
         )
         stack.callback(workers.close)
         if metrics is not None:
-            from gaitswarm.services.monitoring.collectors import WorkersCollector  # noqa: PLC0415
+            from gaitswarm.services.monitoring.metrics import WorkersCollector  # noqa: PLC0415
 
             metrics.registry.register(WorkersCollector(lambda: workers.loads))
         watched: Evaluator = workers

@@ -52,7 +52,7 @@ class ActivityView(View):
         return cls(
             id=job_id,
             reason=reason if known is None else None,
-            workers=list(activity.workers),
+            workers=list(activity.workers.values()),
             iterations=list(activity.iterations),
             tasks=list(activity.tasks),
             messages=[message for message in activity.messages if message.level in severe],

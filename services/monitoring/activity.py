@@ -86,18 +86,10 @@ class MessageView(View):
     iteration: int | None = Field(description="Iteration of the job, from 0; null for none.")
 
 
-@dataclass(frozen=True, slots=True)
-class JobActivity:
-    """Recent activity of a job in this process."""
-
-    iterations: tuple[IterationSpanView, ...] = ()
-    tasks: tuple[TaskSpanView, ...] = ()
-    messages: tuple[MessageView, ...] = ()
-    workers: tuple[WorkerHealthView, ...] = ()
-
-
 @dataclass(slots=True)
-class _Records:
+class JobActivity:
+    """Recent activity of a job in this process; workers by name."""
+
     iterations: deque[IterationSpanView] = field(default_factory=lambda: deque(maxlen=_ITERATIONS))
     tasks: deque[TaskSpanView] = field(default_factory=lambda: deque(maxlen=_TASKS))
     messages: deque[MessageView] = field(default_factory=lambda: deque(maxlen=_MESSAGES))
@@ -110,29 +102,43 @@ class Activity:
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self._jobs: OrderedDict[str, _Records] = OrderedDict()
+        self._jobs: OrderedDict[str, JobActivity] = OrderedDict()
 
     def of(self, job_id: str) -> JobActivity | None:
-        """Return the activity of a job."""
+        """Return a copy of a job's activity."""
         with self._lock:
-            records = self._jobs.get(job_id)
-            if records is None:
+            job = self._jobs.get(job_id)
+            if job is None:
                 return None
-            workers = tuple(records.workers[name] for name in sorted(records.workers))
+            workers = dict(sorted(job.workers.items()))
             return JobActivity(
-                tuple(records.iterations), tuple(records.tasks), tuple(records.messages), workers
+                job.iterations.copy(), job.tasks.copy(), job.messages.copy(), workers
             )
 
     @contextmanager
     def observed(self, request: EvaluationRequest) -> Iterator[OnTask]:
         """Record an evaluation and its tasks."""
-        self.begun(request)
+        span = IterationSpanView(
+            iteration=request.iteration,
+            begun_at=self._now(),
+            designs=len(request.designs),
+            seconds=None,
+            error=None,
+        )
+        with self._lock:
+            self._of(request.job_id).iterations.append(span)
+        error = None
         try:
             yield partial(self.task, request)
-        except BaseException as error:
-            self.ended(request, f"{type(error).__name__}: {error}".rstrip(": "))
+        except BaseException as raised:
+            error = f"{type(raised).__name__}: {raised}".rstrip(": ")
             raise
-        self.ended(request, None)
+        finally:
+            seconds = (self._now() - span.begun_at).total_seconds()
+            with self._lock:
+                spans = self._of(request.job_id).iterations
+                if spans and spans[-1] is span:
+                    spans[-1] = span.model_copy(update={"seconds": seconds, "error": error})
 
     @contextmanager
     def recorded_log(self) -> Iterator[None]:
@@ -145,28 +151,6 @@ class Activity:
         finally:
             root.removeHandler(handler)
 
-    def begun(self, request: EvaluationRequest) -> None:
-        """Record the start of an evaluation."""
-        span = IterationSpanView(
-            iteration=request.iteration,
-            begun_at=self._now(),
-            designs=len(request.designs),
-            seconds=None,
-            error=None,
-        )
-        with self._lock:
-            self._of(request.job_id).iterations.append(span)
-
-    def ended(self, request: EvaluationRequest, error: str | None) -> None:
-        """Record the end of an evaluation."""
-        now = self._now()
-        with self._lock:
-            spans = self._of(request.job_id).iterations
-            if spans and spans[-1].iteration == request.iteration:
-                span = spans.pop()
-                seconds = (now - span.begun_at).total_seconds()
-                spans.append(span.model_copy(update={"seconds": seconds, "error": error}))
-
     def task(self, request: EvaluationRequest, report: TaskReport) -> None:
         span = TaskSpanView(
             iteration=request.iteration,
@@ -178,18 +162,17 @@ class Activity:
             error=report.error,
         )
         with self._lock:
-            records = self._of(request.job_id)
-            records.tasks.append(span)
-            before, failed = records.workers.get(span.worker), span.error is not None
-            error = before.error if before else None
-            records.workers[span.worker] = WorkerHealthView(
+            job = self._of(request.job_id)
+            job.tasks.append(span)
+            before, failed = job.workers.get(span.worker), span.error is not None
+            job.workers[span.worker] = WorkerHealthView(
                 name=span.worker,
                 tasks=(before.tasks if before else 0) + 1,
                 walks=(before.walks if before else 0) + (0 if failed else span.walks),
                 failures=(before.failures if before else 0) + failed,
                 compute_seconds=(before.compute_seconds if before else 0) + span.compute_seconds,
                 last_seen_at=span.begun_at + timedelta(seconds=span.seconds),
-                error=span.error if failed else error,
+                error=span.error or (before.error if before else None),
             )
 
     def message(self, job_id: str, message: MessageView) -> None:
@@ -199,13 +182,13 @@ class Activity:
     def _now(self) -> datetime:
         return datetime.fromtimestamp(self._clock(), UTC)
 
-    def _of(self, job_id: str) -> _Records:
+    def _of(self, job_id: str) -> JobActivity:
         """The caller holds the lock."""
-        records = self._jobs.setdefault(job_id, _Records())
+        job = self._jobs.setdefault(job_id, JobActivity())
         self._jobs.move_to_end(job_id)
         while len(self._jobs) > _JOBS:
             self._jobs.popitem(last=False)
-        return records
+        return job
 
 
 class _LogRecorder(logging.Handler):

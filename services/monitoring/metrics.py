@@ -1,4 +1,4 @@
-"""Metrics of one process, in a separate registry
+"""Metrics of one process, its store and its workers, in a separate registry
 
 Names, units and labels follow Prometheus's conventions: base units, `_total` for counters, and no
 label with unbounded values, such as job ids.
@@ -6,19 +6,38 @@ label with unbounded values, such as job ids.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import collections
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+import numpy as np
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    ProcessCollector,
+    disable_created_metrics,
+)
 from prometheus_client.exposition import choose_encoder
-from prometheus_client.metrics_core import Metric
+from prometheus_client.metrics_core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.estimate import duration
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.provenance import installed_version
+from gaitswarm.services.optimizer.store import Observer
 from gaitswarm.sim.outcome import Status
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
+    from gaitswarm.services.worker.dispatch import Load
 
 _OTHER: Final = "other"
 
@@ -44,6 +63,8 @@ class Metrics:
     """Counters, gauges and histograms of this process. Thread-safe."""
 
     def __init__(self) -> None:
+        # Creation times would double the number of series.
+        disable_created_metrics()  # type: ignore[no-untyped-call]
         self.registry = CollectorRegistry(auto_describe=False)
         registry = self.registry
         counter = partial(Counter, registry=registry)
@@ -126,7 +147,7 @@ class Metrics:
     def exposition(self, accept: str) -> tuple[bytes, str]:
         """Return all metrics in the requested format, and its media type."""
         encode, media_type = choose_encoder(accept)
-        return encode(_Exposed(self.registry)), media_type
+        return encode(self.registry), media_type
 
 
 class OpenStream:
@@ -147,13 +168,124 @@ def failure_cause(error: str | None) -> str:
     return next((cause for words, cause in _CAUSES if words in (error or "")), _OTHER)
 
 
-class _Exposed(Collector):
-    """A registry without creation times, which would double the number of series."""
+class QueueCollector(Collector):
+    """Jobs of a database, counted at each request for metrics.
 
-    def __init__(self, registry: CollectorRegistry) -> None:
-        self._registry = registry
+    While the database is unavailable, the counts are missing and `gaitswarm_database_up` is 0.
+    """
+
+    def __init__(self, store: Callable[[], Store]) -> None:
+        self._store = store
+
+    def describe(self) -> list[Metric]:
+        """Nothing, so that registering a collector needs no database."""
+        return []
 
     def collect(self) -> Iterator[Metric]:
-        for metric in self._registry.collect():
-            metric.samples = [s for s in metric.samples if not s.name.endswith("_created")]
-            yield metric
+        name, text = "gaitswarm_database_up", "Whether the database answers: 1 or 0"
+        try:
+            queue = self._store().queue()
+        except StoreUnavailable:
+            yield _gauge(name, text, {(): 0})
+            return
+        causes = collections.Counter(map(failure_cause, queue.errors))
+        yield _gauge(name, text, {(): 1})
+        by_state = {(state,): count for state, count in queue.jobs.items()}
+        yield _gauge("gaitswarm_jobs", "Jobs in the database", by_state, "state")
+        labels = ("state", "kind")
+        yield _gauge("gaitswarm_queue_jobs", "Jobs that have not ended", queue.under_way, *labels)
+        yield _gauge(
+            "gaitswarm_failed_jobs",
+            "Jobs in the database that have failed",
+            {(cause,): causes[cause] for cause in FAILURE_CAUSES},
+            "cause",
+        )
+        yield _gauge(
+            "gaitswarm_queue_longest_wait_seconds",
+            "Longest time that a queued job has waited for a runner",
+            {(): queue.longest_wait},
+        )
+
+
+def _gauge(name: str, text: str, samples: Mapping[Any, float], *labels: str) -> GaugeMetricFamily:
+    """Return a metric; samples: values by tuples of labels."""
+    metric = GaugeMetricFamily(name, text, labels=labels)
+    for values, sample in samples.items():
+        metric.add_metric(values, sample)
+    return metric
+
+
+class WorkersCollector(Collector):
+    """Slots and queues of the workers at each request for metrics."""
+
+    def __init__(self, loads: Callable[[], Mapping[str, Load]]) -> None:
+        self._loads = loads
+
+    def collect(self) -> Iterator[Metric]:
+        loads = self._loads()
+        for name, text, attribute in (
+            ("slots", "Tasks that can run concurrently", "slots"),
+            ("slots_used", "Slots in use", "used"),
+            ("tasks_waiting", "Tasks waiting for a slot", "waiting"),
+        ):
+            samples = {(worker,): getattr(load, attribute) for worker, load in loads.items()}
+            yield _gauge(f"gaitswarm_worker_{name}", text, samples, "workers")
+
+
+_REMEMBERED_LOSSES: Final = 256
+"""Lost leases remembered, so that each is counted once."""
+
+
+class StoreMetrics(Observer):
+    """Measures what this process does with a store."""
+
+    def __init__(self, metrics: Metrics) -> None:
+        self._metrics = metrics
+        self._lost: dict[tuple[str, int], None] = {}
+        self._lock = threading.Lock()
+
+    def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:
+        self._metrics.database_seconds.labels(operation).observe(seconds)
+        if isinstance(error, StoreUnavailable):
+            self._metrics.database_errors.labels(operation).inc()
+
+    def claimed(self, claim: Claim) -> None:
+        if claim.taken_from is not None:
+            self._metrics.lease_takeovers.inc()
+
+    def committed(self, claim: Claim, done: CompletedIteration, state: JobState) -> None:
+        spec = claim.job.spec
+        self._metrics.iterations.labels(spec.kind).inc()
+        self._metrics.iteration_seconds.observe(done.evaluate_seconds)
+        walked = np.array([key is not None for key in done.keys] or [True] * len(done.fitness))
+        statuses = np.concatenate([outcome.statuses[walked] for outcome in done.outcomes])
+        designs = int(walked.sum())
+        if done.reevaluation is not None:
+            statuses = np.concatenate([statuses, np.ravel(done.reevaluation.statuses)])
+            designs += 1
+        values, counts = np.unique(statuses, return_counts=True)
+        for value, count in zip(values.tolist(), counts.tolist(), strict=True):
+            self._metrics.walks.labels(Status(value).label).inc(count)
+        seconds = duration(spec, spec.cases(claim.recordings))
+        self._metrics.simulated_seconds.inc(designs * seconds)
+        if state.terminal:
+            self._metrics.jobs_ended.labels(state, spec.kind).inc()
+
+    def released(self, claim: Claim, state: JobState, error: str | None) -> None:
+        if state is JobState.FAILED:
+            self._metrics.jobs_ended.labels(state, claim.job.spec.kind).inc()
+            self._metrics.job_failures.labels(failure_cause(error)).inc()
+
+    def lost(self, claim: Claim, error: LeaseLost) -> None:
+        lease = (claim.job.id, claim.token)
+        with self._lock:
+            if not error.taken_over or lease in self._lost:
+                return
+            self._lost[lease] = None
+            if len(self._lost) > _REMEMBERED_LOSSES:
+                del self._lost[next(iter(self._lost))]
+        self._metrics.lease_losses.inc()
+
+    def cancelled(self, job: Job) -> None:
+        kind = job.spec.kind if job.readable else "unknown"
+        self._metrics.jobs_ended.labels(job.state, kind).inc()

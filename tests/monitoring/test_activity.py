@@ -67,7 +67,7 @@ def test_iterations_tasks_and_workers_are_recorded(request_: EvaluationRequest) 
         ("", 997.0, "it died"),
         ("node-1", 998.0, None),
     ]
-    unanswered, node = found.workers
+    unanswered, node = found.workers.values()
     assert (node.name, node.tasks, node.walks, node.failures) == ("node-1", 2, 48, 0)
     assert (unanswered.name, unanswered.tasks, unanswered.walks, unanswered.failures) == (
         "",
@@ -100,7 +100,7 @@ def test_records_are_bounded(request_: EvaluationRequest, monkeypatch: pytest.Mo
     assert activity.of("job 0") is None
     found = activity.of("job 2")
     assert found is not None
-    assert (len(found.tasks), found.workers[0].tasks) == (2000, 2500)
+    assert (len(found.tasks), found.workers["node"].tasks) == (2000, 2500)
 
 
 def test_only_messages_of_a_job_are_recorded() -> None:

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.services.monitoring.collectors import QueueCollector
-from gaitswarm.services.monitoring.metrics import Metrics
-from gaitswarm.services.monitoring.store_metrics import StoreMetrics
+from gaitswarm.services.monitoring.metrics import Metrics, QueueCollector, StoreMetrics
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance

@@ -1,25 +1,4 @@
-"""Errors of the library; those of a database and of a server are the same.
-
-GaitswarmError              everything that gaitswarm raises on purpose
-├── InvalidRequest          an invalid request; `field` names the argument or field
-├── NotFound                no job, iteration, recording or result with that id
-├── Conflict                not possible in the job's present state
-│   ├── ProvenanceChanged   code, robot or libraries differ from those of its numbers
-│   ├── QuotaExceeded       too many unfinished jobs for this client
-│   ├── Unreadable          this version cannot read the stored job, which stays unchanged
-│   └── IdempotencyConflict the key was used before for another job
-├── Forbidden               permission denied
-│   └── Unauthorized        authentication required, or the token is not valid
-├── JobEnded                the awaited job did not succeed; `job` says why
-├── LeaseLost               another process, or a cancellation, has taken the job
-└── Unavailable             temporarily not possible; try again later
-    ├── TooManyRequests     too many requests from this client
-    ├── EvaluatorUnavailable    the workers or the compiler cannot be used
-    └── StoreUnavailable        the database or the server cannot be reached
-
-KeyboardInterrupt
-└── Interrupted             Ctrl-C while running a job: it was queued again and can be resumed
-"""
+"""Errors of the library in addition to those of the service, and conversions to them."""
 
 from __future__ import annotations
 
@@ -27,23 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from gaitswarm.services.optimizer.errors import (
-    Conflict,
-    EvaluatorUnavailable,
-    Forbidden,
-    GaitswarmError,
-    IdempotencyConflict,
-    InvalidRequest,
-    LeaseLost,
-    NotFound,
-    ProvenanceChanged,
-    QuotaExceeded,
-    StoreUnavailable,
-    TooManyRequests,
-    Unauthorized,
-    Unavailable,
-    Unreadable,
-)
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, GaitswarmError, InvalidRequest
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
@@ -103,26 +66,3 @@ def simulation_errors(field: str) -> Iterator[None]:
         raise InvalidRequest(str(error), field=field) from error
     except SimulationError as error:
         raise EvaluatorUnavailable(str(error)) from error
-
-
-__all__ = [
-    "Conflict",
-    "EvaluatorUnavailable",
-    "Forbidden",
-    "GaitswarmError",
-    "IdempotencyConflict",
-    "Interrupted",
-    "InvalidRequest",
-    "JobEnded",
-    "LeaseLost",
-    "NotFound",
-    "ProvenanceChanged",
-    "QuotaExceeded",
-    "StoreUnavailable",
-    "TooManyRequests",
-    "Unauthorized",
-    "Unavailable",
-    "Unreadable",
-    "invalid_request",
-    "simulation_errors",
-]

@@ -11,8 +11,9 @@ from typing import Any, Final, TypedDict, Unpack
 from pydantic import Field, ValidationError
 
 from gaitswarm.designs import ScenariosRequest
-from gaitswarm.errors import InvalidRequest, NotFound, invalid_request, simulation_errors
+from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.robots import replaced_folder
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.views import Finite, View

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.errors import InvalidRequest, JobEnded, NotFound
+from gaitswarm.errors import JobEnded
 from gaitswarm.jobs.base import Jobs
 from gaitswarm.jobs.embedded import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
@@ -23,6 +23,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences as ranked_preferences,
 )
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.evaluator import Evaluator

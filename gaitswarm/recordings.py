@@ -8,7 +8,8 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from gaitswarm.designs import DesignRequest, resolved
-from gaitswarm.errors import InvalidRequest, simulation_errors
+from gaitswarm.errors import simulation_errors
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.listing import RecordingEntry
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.designs import WorldRequest, resolved
-from gaitswarm.errors import InvalidRequest
 from gaitswarm.meshes import urdf_digest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.views import StatusName, View, finite, framed, unframed
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from gaitswarm.designs import WalksRequest
-from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
+from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
 from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform

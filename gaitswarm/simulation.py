@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, WithJsonSchema
 
 from gaitswarm.designs import SimulationRequest
-from gaitswarm.errors import InvalidRequest, simulation_errors
+from gaitswarm.errors import simulation_errors
 from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask
 from gaitswarm.services.optimizer.views import Finite, View, finite
@@ -24,13 +25,7 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait.stability import Stability, static_stability
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.outcome import (
-    MEASUREMENT_NAMES,
-    N_OBJECTIVES,
-    OBJECTIVE_NAMES,
-    Outcome,
-    Status,
-)
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, N_OBJECTIVES, OBJECTIVE_NAMES, Outcome, Status
 from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS

@@ -9,8 +9,9 @@ from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack, cast, overload
 
 from pydantic import BaseModel, ValidationError
 
-from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
+from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.robots import robot_defaults
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from gaitswarm.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 _DESIGN: Final = "design."
 """Prefix of variables in a table of evaluations."""

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import to_json
 
-from gaitswarm.errors import Conflict
 from gaitswarm.evidence.archive import (
     ASKS,
     BEST,
@@ -35,6 +34,7 @@ from gaitswarm.evidence.archive import (
 from gaitswarm.evidence.page import CertificateOnPage, page, pictures
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
+from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import Link
 from gaitswarm.services.optimizer.jobs.documents import AnySpec

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from gaitswarm.errors import InvalidRequest, NotFound, Unavailable
 from gaitswarm.evidence.archive import (
     BEST,
     CERTIFICATES,
@@ -43,6 +42,7 @@ from gaitswarm.services.optimizer.analysis.verification import (
     check_history,
     judged,
 )
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound, Unavailable
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec

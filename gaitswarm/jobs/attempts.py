@@ -11,7 +11,7 @@ from typing import Final
 import httpx2
 from pydantic import ValidationError
 
-from gaitswarm.errors import (
+from gaitswarm.services.optimizer.errors import (
     Conflict,
     Forbidden,
     GaitswarmError,

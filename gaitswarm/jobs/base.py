@@ -16,7 +16,6 @@ from typing import Annotated, Any, Final, Self, TypeAlias, TypeVar, Unpack
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from gaitswarm.designs import SimulationRequest, resolved
-from gaitswarm.errors import InvalidRequest, NotFound
 from gaitswarm.firmware import (
     FirmwareOptions,
     FirmwareRequest,
@@ -63,6 +62,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView
 from gaitswarm.services.optimizer.analysis.scenario_families import TOLERANCE, ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import LARGEST_BUDGET, Command, Job, JobOrder, JobState

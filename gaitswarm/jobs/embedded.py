@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from gaitswarm.errors import Conflict, InvalidRequest, ProvenanceChanged
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator

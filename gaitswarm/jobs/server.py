@@ -14,10 +14,10 @@ from urllib.parse import quote, urlsplit
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
 from gaitswarm.jobs.attempts import Attempts, foreign, unreachable
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
 from gaitswarm.jobs.operation import Operation
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.masking import masked_url

@@ -14,7 +14,7 @@ import pytest
 import gaitswarm.jobs.open as gaitswarm_open
 from gaitswarm.cli import embedded
 from gaitswarm.cli.exit_codes import ExitCode
-from gaitswarm.errors import EvaluatorUnavailable, StoreUnavailable
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.forked import run_forked
 from tests.examples.paths import ROOT

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.cli.files import replacing
-from gaitswarm.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 
 def test_a_file_is_replaced_in_full_or_not_at_all(tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.errors import InvalidRequest
 from gaitswarm.firmware import write_firmware
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from tests.examples.walks import short_walk
 
 PI = {"P": 0.25, "I": 0.0}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gaitswarm.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.settings import place_of, read_place
 
 

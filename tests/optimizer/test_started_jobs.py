@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaitswarm.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded

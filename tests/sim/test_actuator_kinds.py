@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from gaitswarm.errors import InvalidRequest
 from gaitswarm.firmware import FirmwareRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError

@@ -1,0 +1,95 @@
+from gaitswarm.errors import Interrupted, JobEnded
+from gaitswarm.evidence.verify import verify
+from gaitswarm.firmware import FirmwareOptions, FirmwareView, write_firmware
+from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs, AsyncJobs
+from gaitswarm.jobs.base import JobEvent, Jobs
+from gaitswarm.jobs.database import DatabaseJobs
+from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
+from gaitswarm.jobs.server import ServerJobs
+from gaitswarm.optimization import OptimizationResult, optimize, optimizers, robust_preferences
+from gaitswarm.replay import WalkReplay
+from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView
+from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
+from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
+from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView
+from gaitswarm.services.optimizer.analysis.preferences import (
+    PreferenceForView,
+    RobustPreferencesView,
+)
+from gaitswarm.services.optimizer.analysis.ranking import RankingView
+from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
+from gaitswarm.services.optimizer.analysis.targets import TargetsView
+from gaitswarm.services.optimizer.errors import (
+    Conflict,
+    EvaluatorUnavailable,
+    Forbidden,
+    GaitswarmError,
+    IdempotencyConflict,
+    InvalidRequest,
+    LeaseLost,
+    NotFound,
+    ProvenanceChanged,
+    QuotaExceeded,
+    StoreUnavailable,
+    TooManyRequests,
+    Unauthorized,
+    Unavailable,
+    Unreadable,
+)
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.labels import JobFilter
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.services.optimizer.search.automatic import AutoSettings
+from gaitswarm.services.optimizer.search.bayesian import BayesianSettings
+from gaitswarm.services.optimizer.search.cma_es import CmaEsSettings
+from gaitswarm.services.optimizer.search.differential_evolution import DeSettings
+from gaitswarm.services.optimizer.search.hype import HypeSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.sim.calibration.targets import Target, TargetWalk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Status
+from gaitswarm.sim.robot import RobotFiles, RobotVariant
+from gaitswarm.sim.scenario import PRESETS, SCENARIOS, Scenario
+from gaitswarm.sim.variables import Variable
+from gaitswarm.simulation import ScenarioResult, SimulationResult, simulate
+from gaitswarm.specs import SpecOptions, job_spec
+from gaitswarm.surface import SurfaceView
+from gaitswarm.tables import EvaluationTable, Table
+from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
+from gaitswarm.views.job import JobSummaryView, JobView, StateView
+from gaitswarm.views.verification import VerificationView
+
+__all__ = [
+    "CONTROLLERS", "MEASUREMENTS", "OBJECTIVES", "PREFERENCES", "PRESETS", "SCENARIOS",
+    "AsyncDatabaseJobs", "AsyncJobs", "AutoSettings", "Backoff", "BayesianSettings", "BestView",
+    "CalibrationSpec", "CertificateSpec", "CertificateView", "CmaEsSettings", "Conflict",
+    "DatabaseJobs", "DeSettings", "EvaluationTable", "EvaluationView", "EvaluatorUnavailable",
+    "FirmwareOptions", "FirmwareView", "Forbidden", "FrontView", "GaitswarmError",
+    "HistoryIterationView", "HypeSettings", "IdempotencyConflict", "IdentifiabilityView",
+    "IdentificationSpec", "ImportanceView", "Interrupted", "InvalidRequest", "IterationView",
+    "JobComparisonView", "JobEnded", "JobEvent", "JobFilter", "JobSpec", "JobSummaryView",
+    "JobView", "Jobs", "LeaseLost", "NotFound", "OptimizationResult", "Preference",
+    "PreferenceForView", "ProvenanceChanged", "PsoPsSettings", "PsoSettings", "QuotaExceeded",
+    "RandomSearchSettings", "RankingView", "RecordedWalk", "RobotFiles", "RobotVariant",
+    "RobustPreferencesView", "RobustnessOptions", "RobustnessView", "Scenario",
+    "ScenarioFamiliesView", "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
+    "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
+    "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
+    "Variable", "VerificationView", "WalkLog", "WalkReplay", "__version__", "connect",
+    "connect_async", "job_spec", "open", "open_async", "optimize", "optimizers",
+    "robust_preferences", "robustness", "simulate", "verify", "write_firmware",
+]  # fmt: skip
+
+__version__: str

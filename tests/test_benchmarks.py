@@ -153,3 +153,16 @@ def test_the_scale_benchmark_counts_the_costs_of_tasks_and_iterations() -> None:
     (tasks,), (iterations,) = found["tasks"], found["iterations"]
     assert tasks["tasks"] == 12
     assert min(tasks["evaluator_ms"], iterations["iteration_ms"]) > 0.0
+
+
+@pytest.mark.slow
+def test_a_profile_reports_shares_of_the_slots_time(report: Report) -> None:
+    brief = ("--particles", "2", "--iterations", "2", "--cpus", "1")
+    found = report("profile", "--evaluator", "in-process", *brief)
+    assert (found["slots"], found["walks"]) == (1, 12)
+    assert found["walks_per_second"] == pytest.approx(12 / found["seconds"])
+    assert 0.0 < found["lane_use"] <= 1.0
+    shares = found["shares"]
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert min(shares.values()) >= 0.0
+    assert all(shares[name] > 0.0 for name in ("physics", "tables", "preparation", "store"))

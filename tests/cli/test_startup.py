@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from functools import cache, partial
 from typing import Any
 
 import pytest
@@ -11,7 +10,6 @@ from typer import Context
 
 from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.cli.main import commands
-from gaitswarm.services.profile import profile_job
 from gaitswarm.sim.assembly import PHYSICS_RATE
 from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.walk import Precision
@@ -131,23 +129,3 @@ def test_bench_names_unknown_values(gaitswarm: Gaitswarm, option: str) -> None:
     result = gaitswarm("bench", option, "abacus")
     assert result.code == 2
     assert option.removeprefix("--") in result.err
-
-
-@pytest.mark.slow
-def test_a_profile_reports_shares_of_the_slots_time(
-    gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    brief = cache(partial(profile_job, particles=2, iterations=2, cpus=1))
-    monkeypatch.setattr("gaitswarm.services.profile.profile_job", brief)
-    result = gaitswarm("bench", "--profile", "--evaluator", "in-process", "--json")
-    assert result.code == 0, result.err
-    found = result.json
-    assert (found["slots"], found["walks"]) == (1, 12)
-    assert found["walks_per_second"] == pytest.approx(12 / found["seconds"])
-    assert 0.0 < found["lane_use"] <= 1.0
-    shares = found["shares"]
-    assert sum(shares.values()) == pytest.approx(1.0)
-    assert min(shares.values()) >= 0.0
-    assert all(shares[name] > 0.0 for name in ("physics", "tables", "preparation", "store"))
-    printed = gaitswarm("bench", "--profile", "--evaluator", "in-process").out
-    assert all(f"\n  {name} " in printed for name in shares)

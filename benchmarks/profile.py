@@ -1,12 +1,18 @@
-"""Profile of a job's time: physics, control, tables, workers"""
+"""Profile of a job of chapter 4 on all cores: physics, control, tables, workers, search, store.
+
+python -m benchmarks.profile [--evaluator ray|in-process] [--precision double|single] [--json]
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import tempfile
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Final, get_args
 
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
@@ -21,6 +27,16 @@ from gaitswarm.services.worker.tasks import TaskTotals
 from gaitswarm.sim.assembly import kernel_of
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
+
+_SHARES: Final = {
+    "physics": "kernel: physics steps",
+    "control": "kernel: control ticks",
+    "tables": "tasks: fuzzy tables",
+    "preparation": "tasks: desired angles, parameters, objectives",
+    "workers": "transfer of tasks and results, waiting for the last worker",
+    "search": "judging designs and asking for the next",
+    "store": "store",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,3 +157,32 @@ class _StoreTime(Observer):
     def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:  # noqa: ARG002
         if threading.get_ident() == self._thread:
             self.seconds += seconds
+
+
+def main() -> None:
+    """Print a profile, as text or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--evaluator", choices=("ray", "in-process"), default="ray")
+    parser.add_argument("--precision", choices=get_args(Precision), default="double")
+    parser.add_argument("--particles", type=int, default=25)
+    parser.add_argument("--iterations", type=int, default=25)
+    parser.add_argument("--cpus", type=int)
+    parser.add_argument("--json", action="store_true")
+    options = vars(parser.parse_args())
+    as_json = options.pop("json")
+    profile = profile_job(**options)
+    if as_json:
+        print(json.dumps(asdict(profile)))
+        return
+    print(
+        f"{profile.walks} simulations of a chapter-4 job, {profile.slots} slots"
+        f" ({profile.evaluator}), {profile.precision} precision: {profile.seconds:.2f} s,"
+        f" {profile.walks_per_second:.0f} simulations/s, {profile.lane_use:.1%} of the kernel's"
+        " lanes used\nshares of the slots' time:"
+    )
+    for name, share in profile.shares.items():
+        print(f"  {name:12} {share:6.1%}  {_SHARES[name]}")
+
+
+if __name__ == "__main__":
+    main()

@@ -25,8 +25,12 @@ from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token
 from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
-from gaitswarm.services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
-from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.job import (
+    DEFAULT_PRIORITY,
+    HIGHEST_PRIORITY,
+    LOWEST_PRIORITY,
+    Quota,
+)
 from gaitswarm.views.base import PREFIX
 
 if TYPE_CHECKING:
@@ -332,10 +336,14 @@ OwnersQuota = Annotated[Quota | None, Depends(quota_of)]
 
 def check_may_prioritize(token: Token | None, priority: int) -> None:
     """Require scope `admin` for priorities above the default."""
-    if priority > DEFAULT and token is not None and not token.scope.allows(TokenScope.ADMIN):
+    if (
+        priority > DEFAULT_PRIORITY
+        and token is not None
+        and not token.scope.allows(TokenScope.ADMIN)
+    ):
         raise Forbidden(
             f"the token {token.name!r} of scope `{token.scope}` may not set a priority above"
-            f" {DEFAULT}; use one of scope `admin`"
+            f" {DEFAULT_PRIORITY}; use one of scope `admin`"
         )
 
 
@@ -353,14 +361,14 @@ async def job_priority(
         int,
         Header(
             alias="Job-Priority",
-            ge=LOWEST,
-            le=HIGHEST,
+            ge=LOWEST_PRIORITY,
+            le=HIGHEST_PRIORITY,
             description="Priority of the job: queued jobs start in order of priority, and each step"
             " doubles the share of workers of a running job. Values above 0 require a token of"
             " scope `admin`, where tokens are required.",
             examples=[0],
         ),
-    ] = DEFAULT,
+    ] = DEFAULT_PRIORITY,
 ) -> int:
     """Return the priority of a new job."""
     check_may_prioritize(token, priority)

@@ -17,8 +17,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
 from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceName
-from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.jobs.start import EarlierJobs
+from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
 from gaitswarm.services.optimizer.search.automatic import ChoiceName, ChosenSettings
 from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName

@@ -37,9 +37,8 @@ if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.monitoring.tracing import Tracing
-    from gaitswarm.services.worker.auto import AutoEvaluator
     from gaitswarm.services.worker.in_process import InProcessEvaluator
-    from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+    from gaitswarm.services.worker.ray_evaluator import AutoEvaluator, RayEvaluator
 
 
 def open_evaluator(
@@ -51,9 +50,8 @@ def open_evaluator(
     lasting: bool = False,
 ) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
     """Create the evaluator of a kind."""
-    from gaitswarm.services.worker.auto import AutoEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
-    from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
+    from gaitswarm.services.worker.ray_evaluator import AutoEvaluator, RayEvaluator  # noqa: PLC0415
 
     check_address(address)
     if kind == "in-process" or (kind == "auto" and address is None and not lasting):

@@ -65,10 +65,18 @@ from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.job import LARGEST_BUDGET, Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.job import (
+    HIGHEST_PRIORITY,
+    LARGEST_BUDGET,
+    LOWEST_PRIORITY,
+    Command,
+    Job,
+    JobOrder,
+    JobState,
+    check_priority,
+)
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
-from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST, check_priority
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -522,7 +530,9 @@ class Jobs(ABC):
     def prioritize(
         self,
         job_id: str,
-        priority: Annotated[int, Field(strict=True, ge=LOWEST, le=HIGHEST, examples=[5])],
+        priority: Annotated[
+            int, Field(strict=True, ge=LOWEST_PRIORITY, le=HIGHEST_PRIORITY, examples=[5])
+        ],
     ) -> JobView:
         """Change the priority of a job that has not ended.
 

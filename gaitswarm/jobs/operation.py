@@ -16,8 +16,7 @@ from pydantic.fields import FieldInfo
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
-from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.job import Job, Quota
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.services.optimizer.views import Request
 from gaitswarm.specs import checked

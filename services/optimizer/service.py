@@ -91,13 +91,11 @@ from gaitswarm.services.optimizer.jobs.estimate import (
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Iteration
-from gaitswarm.services.optimizer.jobs.job import Claim, Job, refusal
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, Quota, check_priority, refusal
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.priority import check_priority
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from gaitswarm.services.optimizer.run.runner import runner_name

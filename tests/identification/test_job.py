@@ -10,8 +10,8 @@ import pytest
 from gaitswarm.services.optimizer.analysis.identifiability import Trust
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.preference import Judgement
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store

@@ -16,8 +16,12 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.analysis.certificate import certificate
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
+from gaitswarm.services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Judgement,
+    geometric_mean,
+    judge,
+)
 from tests.certificate.examples import columns, small
 
 DESIGNS = 20_000

@@ -25,8 +25,7 @@ from gaitswarm.services.optimizer.jobs.provenance import (
     job_provenance,
     optimizer_files,
 )
-from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.jobs.start import EarlierJobs
+from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
 from gaitswarm.services.optimizer.run.coordinator import (
     Begin,
     Claimed,

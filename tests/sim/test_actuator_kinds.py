@@ -8,8 +8,7 @@ import pytest
 
 from gaitswarm.firmware import FirmwareRequest
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.robot import RobotFiles, load_robot, parse_robot
 from gaitswarm.sim.robot.actuators import TorqueActuator

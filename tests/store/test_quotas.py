@@ -7,8 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from gaitswarm.services.optimizer.errors import QuotaExceeded
-from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.job import Command, JobState, Quota
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import spec

@@ -8,7 +8,7 @@ import sys
 import threading
 
 from gaitswarm.services.worker import ray_evaluator
-from gaitswarm.services.worker.auto import AutoEvaluator
+from gaitswarm.services.worker.ray_evaluator import AutoEvaluator
 from tests.examples.processes import eventually
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request, walked_at_once

@@ -13,9 +13,8 @@ import pytest
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
 from gaitswarm.services.runtime import open_evaluator
-from gaitswarm.services.worker.auto import AutoEvaluator
 from gaitswarm.services.worker.in_process import InProcessEvaluator
-from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.ray_evaluator import AutoEvaluator, RayEvaluator
 from gaitswarm.services.worker.ray_session import RaySession
 from tests.examples.processes import eventually
 from tests.worker.requests import bits, never, request, walked_at_once

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import KilledWorker, ProvenanceChanged
-from gaitswarm.services.optimizer.jobs.priority import weight
+from gaitswarm.services.optimizer.jobs.job import weight
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     EvaluationStopped,

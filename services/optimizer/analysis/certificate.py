@@ -12,9 +12,8 @@ from pydantic import Field
 from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
+from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Judgement, Preference
 from gaitswarm.services.optimizer.views import (
     DesignValues,
     Finite,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
-from gaitswarm.services.optimizer.jobs.judgement import exponential
+from gaitswarm.services.optimizer.jobs.preference import exponential
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import (
     DesignValues,

@@ -43,8 +43,7 @@ from gaitswarm.services.optimizer.jobs.fork import (
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
-from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.jobs.start import EarlierJobs
+from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Jobs, claims and their states"""
+"""Jobs, claims, their states, priorities and quotas"""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Final
 
-from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, Unreadable
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, QuotaExceeded, Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask, JournalEntry
@@ -20,6 +20,53 @@ from gaitswarm.services.optimizer.jobs.provenance import (
 )
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.sim.identification.recorded_walk import Recordings
+
+DEFAULT_PRIORITY: Final = 0
+
+LOWEST_PRIORITY: Final = -10
+HIGHEST_PRIORITY: Final = 10
+
+
+def check_priority(priority: int) -> None:
+    """Check that a priority is within bounds."""
+    if not LOWEST_PRIORITY <= priority <= HIGHEST_PRIORITY:
+        raise InvalidRequest(
+            f"must be from {LOWEST_PRIORITY} (last) to {HIGHEST_PRIORITY} (first), it is"
+            f" {priority}",
+            field="priority",
+        )
+
+
+def weight(priority: int) -> float:
+    """Return the weight by which running jobs share slots; it doubles with each step."""
+    return 2.0**priority
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """Limits on the unfinished jobs of one owner; jobs without an owner count together.
+
+    A job is unfinished until it has succeeded, failed or been cancelled; its whole budget counts,
+    whatever part of it has been spent.
+    """
+
+    jobs: int
+    seconds: float  # simulated time of all their simulations [s]
+
+    def check(self, jobs: int, seconds: float, *, new_jobs: int, new_seconds: float) -> None:
+        """Raise QuotaExceeded if new jobs or simulated time exceed the limits."""
+        if new_jobs and jobs + new_jobs > self.jobs:
+            raise QuotaExceeded(
+                f"{jobs} unfinished jobs of this owner reach the limit of {self.jobs};"
+                " wait until one ends, cancel one, or ask an admin"
+            )
+        if new_seconds > 0.0 and seconds + new_seconds > self.seconds:
+            raise QuotaExceeded(
+                f"the unfinished jobs of this owner take {seconds:.3g} simulated s, with this one"
+                f" {seconds + new_seconds:.3g} s; the limit is {self.seconds:.3g} s. Use fewer"
+                " iterations, wait until a job ends, cancel one, or ask an admin",
+                field="iterations",
+            )
 
 
 class JobState(StrEnum):

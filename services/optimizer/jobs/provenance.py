@@ -21,7 +21,6 @@ _JUDGING: Final = (
     "jobs/optimizer_choice.py",
     "jobs/preference.py",
     "jobs/spec.py",
-    "jobs/start.py",
 )
 """Files that judge designs, for all kinds of jobs."""
 

@@ -11,19 +11,18 @@ Spec
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Annotated, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.judgement import Judgement, by_design
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from gaitswarm.services.optimizer.jobs.start import EarlierJobs, StartChoice
+from gaitswarm.services.optimizer.jobs.preference import Judgement, by_design
 from gaitswarm.services.optimizer.search.automatic import AutoSettings, chosen_method
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.registry import (
@@ -43,6 +42,53 @@ from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.variables import VariableChoice, VariableName, VariableValue
+
+_DESIGNS: Final = "<designs>"
+_JOBS: Final = "<jobs>"
+
+StartDesign = Annotated[
+    dict[VariableName, VariableValue],
+    Field(
+        min_length=1,
+        max_length=128,
+        description="Value of every searched variable, by name; a categorical one by a"
+        " choice's name or index. Fixed variables may be omitted.",
+        examples=[{"FI1R": 4380.5, "FO2R": 231.0}],
+    ),
+]
+
+
+class EarlierJobs(BaseModel):
+    """The best designs of earlier jobs, looked up once, at submission."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    jobs: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = Field(
+        min_length=1,
+        max_length=100,
+        description="Job identifiers; the best design of each comes first, then the second ones.",
+        examples=[["k2q7zr5dm9xw"]],
+    )
+    count: int = Field(
+        default=5, ge=1, le=10_000, description="Maximum number of distinct designs in total [1]."
+    )
+
+
+def _tag(value: Any) -> str | None:
+    if isinstance(value, Mapping | EarlierJobs):
+        return _JOBS
+    return _DESIGNS if isinstance(value, list | tuple) else None
+
+
+StartChoice = Annotated[
+    Annotated[tuple[StartDesign, ...], Field(max_length=10_000, fail_fast=True), Tag(_DESIGNS)]
+    | Annotated[EarlierJobs, Tag(_JOBS)],
+    Discriminator(
+        _tag,
+        custom_error_type="no_choice",
+        custom_error_message="must be a list of designs, or an object that names earlier jobs",
+    ),
+]
 
 Floats = NDArray[np.float64]
 

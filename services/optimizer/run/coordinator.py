@@ -48,10 +48,10 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     Answered,
     Ask,
     CompletedIteration,
+    EvaluationColumns,
     Reevaluation,
 )
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, refusal
-from gaitswarm.services.optimizer.jobs.judgement import by_design
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.jobs.spec import Spec, judge_outcomes
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
@@ -253,14 +253,16 @@ class Coordination:
     answered: Answered | None = None  # the last answered ask, if the claim had no open one
     # of the best committed design, in double precision; +inf if there is none
     best_fitness: float = math.inf
-    evaluations: int = 0
     ask: Ask | None = None
     done: CompletedIteration | None = None  # the evaluated iteration until it is committed
     following: Ask | None = None  # the ask after the commit in progress
     failures: int = 0  # consecutive failures of the workers
 
 
-def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
+Decision = tuple[Coordination, tuple[Action, ...]]
+
+
+def handle(state: Coordination, event: Event) -> Decision:  # noqa: C901, PLR0911 - the table
     """Return the next state and the actions for an event."""
     match state.phase, event:
         case Phase.ENDED, _:
@@ -269,83 +271,84 @@ def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Actio
             return replace(state, phase=Phase.ENDED), ()
         case (_, StopRequested()) | (Phase.WAITING, PauseSeen()):
             return _release(state, JobState.QUEUED)
-        case _:
-            return _proceed(state, event)
-
-
-def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
-    match state.phase, event:
         case Phase.START, Claimed():
             return _start(state, event)
         case Phase.EVALUATING, Extended(job=job):
             return _begin(state, job)
-        case Phase.EVALUATING | Phase.REEVALUATING, (
-            Evaluated() | EvaluatorLost() | EvaluationFailed()
-        ):
-            return _answer(state, event)
+        case Phase.EVALUATING, Evaluated():
+            return _complete(state, event)
+        case Phase.REEVALUATING, Evaluated():
+            return _reevaluated(state, event)
+        case ((Phase.EVALUATING | Phase.REEVALUATING), EvaluatorLost(reason=reason)):
+            failures = state.failures + 1
+            wait = Wait(state.backoff.pause(failures), reason)
+            return replace(state, phase=Phase.WAITING, failures=failures), (wait,)
+        case ((Phase.EVALUATING | Phase.REEVALUATING), EvaluationFailed(reason=reason)):
+            return _release(state, JobState.FAILED, reason)
         case Phase.WAITING, Waited():
-            return _evaluate_next(state)
+            return _evaluate(state)
         case Phase.COMMITTING, Committed(state=stored):
             return _continue(state, stored)
         case Phase.COMMITTING, Extended(job=job):
-            return _ask_again(state, job)
+            return _commit(replace(state, job=job), _done(state))
         case phase, _:
             raise ValueError(f"unexpected {type(event).__name__} while {phase}")
 
 
-def _answer(
-    state: Coordination, event: Evaluated | EvaluatorLost | EvaluationFailed
-) -> tuple[Coordination, tuple[Action, ...]]:
-    match event:
-        case EvaluatorLost(reason=reason):
-            return _retry(state, reason)
-        case EvaluationFailed(reason=reason):
-            return _release(state, JobState.FAILED, reason)
-        case Evaluated() if state.phase is Phase.REEVALUATING:
-            return _reevaluated(state, event)
-        case Evaluated():
-            return _complete(state, event)
-
-
-def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Action, ...]]:
+def _start(state: Coordination, event: Claimed) -> Decision:
     claim, job = event.claim, event.claim.job
     refused = refusal(job, event.provenance)
     if refused is not None and not (event.accepts_changes or job.accepts_changes):
         return _release(state, JobState.FAILED, refused)
     state = replace(
         state,
-        phase=Phase.EVALUATING,
         job=job,
         recordings=claim.recordings,
         provenance=event.provenance,
         answered=claim.answered,
         best_fitness=math.inf if job.progress.best_fitness is None else job.progress.best_fitness,
-        evaluations=job.progress.evaluations,
         ask=claim.ask,
     )
     is_recorded = job.provenance and refused is None and not job.accepts_changes
     record = () if is_recorded else (Record(event.provenance),)
-    if claim.ask is not None:
-        return state, (*record, _evaluate(state))
-    state, actions = _begin(state, job)
+    state, actions = _begin(state, job) if claim.ask is None else _evaluate(state)
     return state, (*record, *actions)
 
 
-def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
+def _begin(state: Coordination, job: Job) -> Decision:
     if state.answered is not None:
-        columns = state.answered.columns
-        feedback = job.spec.search_feedback(columns.objectives, columns.failed, columns.fitness)
-        first = _following(job.spec, state.answered.ask, feedback)
+        first = _following(job.spec, state.answered.ask, state.answered.columns)
     else:
         first = _ask(job.spec, job.spec.create_search())
     if first is None:
         raise ValueError(f"job {job.id} has spent its budget")
-    state = replace(state, job=job, ask=first)
-    return state, (Begin(first), _evaluate(state))
+    state, actions = _evaluate(replace(state, job=job, ask=first))
+    return state, (Begin(first), *actions)
 
 
-def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
-    job, ask = _current(state)
+def _evaluate(state: Coordination) -> Decision:
+    """Evaluate the ask, or its best design in double precision once the ask is evaluated."""
+    job, ask, provenance = _current(state)
+    if state.done is None:
+        phase, spec = Phase.EVALUATING, job.spec
+        designs = spec.design_space().designs(ask.positions)
+    else:
+        phase, spec = Phase.REEVALUATING, job.spec.in_double()
+        best = int(np.argmin(state.done.fitness))
+        designs = state.done.designs[best : best + 1]
+    request = EvaluationRequest(
+        job_id=job.id,
+        cases=spec.cases(state.recordings),
+        designs=spec.design_space().simulated(designs),
+        provenance=provenance.simulation.model_copy(update={"precision": spec.precision}),
+        iteration=ask.iteration,
+    )
+    keys = walk_keys(spec, request.provenance, request.designs)
+    return replace(state, phase=phase), (Evaluate(request, keys),)
+
+
+def _complete(state: Coordination, event: Evaluated) -> Decision:
+    job, ask, _ = _current(state)
     fitness = judge_outcomes(job.spec, event.outcomes).fitness
     done = CompletedIteration(
         iteration=ask.iteration,
@@ -358,12 +361,12 @@ def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tupl
     )
     state = replace(state, done=done, failures=0)
     if done.precision != "double" and fitness.min() < state.best_fitness:
-        return _evaluate_next(state)
+        return _evaluate(state)
     return _commit(state, done)
 
 
-def _reevaluated(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
-    job, _ = _current(state)
+def _reevaluated(state: Coordination, event: Evaluated) -> Decision:
+    job, _, _ = _current(state)
     done = _done(state)
     reevaluation = Reevaluation(
         particle=int(np.argmin(done.fitness)),
@@ -378,83 +381,31 @@ def _reevaluated(state: Coordination, event: Evaluated) -> tuple[Coordination, t
     )
 
 
-def _commit(
-    state: Coordination, done: CompletedIteration
-) -> tuple[Coordination, tuple[Action, ...]]:
-    job, ask = _current(state)
-    feedback = job.spec.search_feedback(*by_design(done.outcomes), done.fitness)
-    following = _following(job.spec, ask, feedback)
+def _commit(state: Coordination, done: CompletedIteration) -> Decision:
+    job, ask, _ = _current(state)
+    following = _following(job.spec, ask, done.columns)
     state = replace(state, phase=Phase.COMMITTING, done=done, following=following)
     return state, (Commit(done, following),)
 
 
-def _ask_again(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
-    return _commit(replace(state, job=job), _done(state))
-
-
-def _continue(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[Action, ...]]:
+def _continue(state: Coordination, stored: JobState) -> Decision:
     if stored is not JobState.RUNNING or state.following is None:
         return replace(state, phase=Phase.ENDED), ()
     best = _done(state).best
-    state = replace(
-        state,
-        best_fitness=min(state.best_fitness, math.inf if best is None else best[1]),
-        evaluations=state.evaluations + len(_done(state).fitness),
-        ask=state.following,
-        following=None,
-        done=None,
-    )
-    return _evaluate_next(state)
+    best_fitness = min(state.best_fitness, math.inf if best is None else best[1])
+    state = replace(state, ask=state.following, following=None, done=None)
+    return _evaluate(replace(state, best_fitness=best_fitness))
 
 
-def _evaluate_next(state: Coordination) -> tuple[Coordination, tuple[Action, ...]]:
-    if state.done is None:
-        return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
-    return replace(state, phase=Phase.REEVALUATING), (_reevaluate(state, state.done),)
-
-
-def _retry(state: Coordination, reason: str) -> tuple[Coordination, tuple[Action, ...]]:
-    failures = state.failures + 1
-    wait = Wait(state.backoff.pause(failures), reason)
-    return replace(state, phase=Phase.WAITING, failures=failures), (wait,)
-
-
-def _release(
-    state: Coordination, released: JobState, error: str | None = None
-) -> tuple[Coordination, tuple[Action, ...]]:
+def _release(state: Coordination, released: JobState, error: str | None = None) -> Decision:
     return replace(state, phase=Phase.ENDED), (Release(released, error),)
 
 
-def _evaluate(state: Coordination) -> Evaluate:
-    job, ask = _current(state)
-    return _evaluation_of(state, job.spec, job.spec.design_space().designs(ask.positions))
-
-
-def _reevaluate(state: Coordination, done: CompletedIteration) -> Evaluate:
-    job, _ = _current(state)
-    best = int(np.argmin(done.fitness))
-    return _evaluation_of(state, job.spec.in_double(), done.designs[best : best + 1])
-
-
-def _evaluation_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> Evaluate:
-    job, ask = _current(state)
-    if state.provenance is None:
-        raise ValueError(f"no job was claimed, while {state.phase}")
-    request = EvaluationRequest(
-        job_id=job.id,
-        cases=spec.cases(state.recordings),
-        designs=spec.design_space().simulated(designs),
-        provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
-        iteration=ask.iteration,
-    )
-    return Evaluate(request, walk_keys(spec, request.provenance, request.designs))
-
-
-def _following(spec: Spec, ask: Ask, feedback: NDArray[np.float64]) -> Ask | None:
+def _following(spec: Spec, ask: Ask, columns: EvaluationColumns) -> Ask | None:
     """Return the ask after an answered one; None at the end of the budget."""
     optimizer = spec.create_search()
     optimizer.load(ask.state)
-    optimizer.tell(feedback)
+    optimizer.tell(spec.search_feedback(columns.objectives, columns.failed, columns.fitness))
     return _ask(spec, optimizer)
 
 
@@ -479,7 +430,7 @@ def _done(state: Coordination) -> CompletedIteration:
     return state.done
 
 
-def _current(state: Coordination) -> tuple[Job, Ask]:
-    if state.job is None or state.ask is None:
+def _current(state: Coordination) -> tuple[Job, Ask, JobProvenance]:
+    if state.job is None or state.ask is None or state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
-    return state.job, state.ask
+    return state.job, state.ask, state.provenance

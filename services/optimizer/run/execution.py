@@ -25,8 +25,7 @@ from gaitswarm.services.optimizer.errors import (
     Unavailable,
 )
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
-from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
-from gaitswarm.services.optimizer.jobs.priority import weight
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.log_context import log_context
@@ -37,6 +36,7 @@ from gaitswarm.services.optimizer.run.coordinator import (
     Commit,
     Committed,
     Coordination,
+    Decision,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -128,9 +128,6 @@ def run_claim(
             context.store.release(claim, JobState.QUEUED)
         raise
     return context.store.job(claim.job.id)
-
-
-Decision = tuple[Coordination, tuple[Action, ...]]
 
 
 def _fail(state: Coordination, error: Exception, what: str) -> Decision:

@@ -29,6 +29,7 @@ from gaitswarm.services.optimizer.jobs.job import (
     Command,
     Job,
     JobState,
+    Quota,
     commanded,
     extended,
 )
@@ -39,9 +40,7 @@ from gaitswarm.services.optimizer.jobs.labels import (
     robot_name,
 )
 from gaitswarm.services.optimizer.jobs.listing import folded, storable
-from gaitswarm.services.optimizer.jobs.priority import check_can_be_prioritized
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
-from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.store.changes import announce
@@ -335,7 +334,9 @@ class Jobs(Aggregate):
         """
         with self._database.write("prioritize") as connection:
             row = job_row(connection, job_id, lock=True)
-            check_can_be_prioritized(JobState(row["state"]))
+            state = JobState(row["state"])
+            if state.terminal:
+                raise Conflict(f"cannot prioritize a job that is {state}; it has ended")
             now, action = self._clock(connection), AuditAction.PRIORITIZE
             note_change(connection, now, actor, action, job_id, priority=priority)
             return to_job(update_job(connection, row, {"priority": priority}))

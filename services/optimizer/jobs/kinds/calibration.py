@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
+    Judgement,
     PreferenceName,
     figure_of_merit,
     judge,

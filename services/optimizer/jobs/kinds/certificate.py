@@ -16,8 +16,7 @@ from gaitswarm.services.optimizer.jobs.kinds.held_out import (
     certificate_scenarios,
     certificate_walks,
 )
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.jobs.spec import requested

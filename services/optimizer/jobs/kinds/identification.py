@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.preference import Judgement
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.errors import SimulationInputError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,24 +14,89 @@ from pydantic_core import CoreSchema
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
-from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
-from gaitswarm.services.optimizer.jobs.spec import requested
+from gaitswarm.services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Judgement,
+    Preference,
+    PreferenceChoice,
+    figure_of_merit,
+    judge,
+    objective_vectors,
+)
+from gaitswarm.services.optimizer.jobs.spec import Spec, requested
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.case import Case, Walk
 from gaitswarm.sim.case_registry import CASES, CaseFamily, CaseSettings, create_case
-from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import PluginSettings
-from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
-from gaitswarm.sim.simulate import check_reach
+from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_worlds
 from gaitswarm.sim.worlds.walks import PerturbedWalk
+
+Floats = NDArray[np.float64]
+
+
+class WalksSpec(Spec):
+    """A job with scenarios and a preference; each kind declares these fields with its defaults."""
+
+    if TYPE_CHECKING:
+        scenarios: tuple[ScenarioChoice, ...]
+        preference: PreferenceChoice
+
+    @model_validator(mode="after")
+    def _scenarios_differ(self) -> Self:
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """Return the scenarios with presets resolved."""
+        return tuple(
+            find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
+        )
+
+    def resolved_preference(self) -> Preference:
+        """Return the preference with a preset resolved."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
+
+    def check_drives(self, law: ControlLaw) -> None:
+        """Check that the controller can drive the robot's actuators.
+
+        Args:
+            law: Of any design of the controller.
+
+        Raises:
+            InvalidRequest: It cannot; the field is `controller`.
+        """
+        with requested("controller"):
+            check_drives(law, self.robot)
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """Raw objectives of a walk: f1..f6 of table 4.1."""
+        return OBJECTIVES
+
+    @property
+    def case_names(self) -> tuple[str, ...]:
+        """Names of the scenarios, in order."""
+        return tuple(scenario.name for scenario in self.resolved_scenarios())
+
+    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """Judge designs by the preference (eq. 3.8, 4.1, 4.2)."""
+        return judge(objectives, failed, self.resolved_preference())
+
+    def figure_of_merit(self, fitness: float) -> float | None:
+        """Return F of eq. 3.1, maximized; None unless the preference is that of chapter 3."""
+        return figure_of_merit(fitness, self.resolved_preference())
 
 
 def _case_settings(choice: object) -> object:
@@ -71,8 +136,6 @@ else:
         None, PluginSettings(CASES, _model, "/v1/cases"), BeforeValidator(_case_settings), _OrName()
     ]
 """Choice of a case; validation replaces a name by settings."""
-
-Floats = NDArray[np.float64]
 
 GAIT_OF_CHAPTER_3: Final = ("cycle_time", "stride", "height", "duty_factor", "fir_ms")
 """Gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""

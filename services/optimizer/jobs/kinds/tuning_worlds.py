@@ -11,8 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from gaitswarm.services.optimizer.jobs.judgement import Judgement
-from gaitswarm.services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
+from gaitswarm.services.optimizer.jobs.preference import (
+    Judgement,
+    Preference,
+    geometric_mean,
+    log_utilities,
+)
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice

@@ -173,7 +173,7 @@ def test_the_list_can_be_searched_by_name_whatever_its_case(
 def test_a_name_of_any_characters_keeps_no_other_job_from_the_list(
     store: Store, clock: Clock
 ) -> None:
-    made = named(store, clock, "zero\0byte", '"\\ü\U0001f916', "plain")
+    made = named(store, clock, "'; DROP", '"\\ü\U0001f916', "plain")
     listed = store.jobs(order=JobOrder.NAME).items
     assert {job.id for job in listed} == {job.id for job in made}
     assert [job.id for job in store.jobs(search="ü").items] == [made[1].id]

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlalchemy import Text, cast, select, text
 
-from gaitswarm.services.optimizer.errors import Conflict, IdempotencyConflict, Unreadable
+from gaitswarm.services.optimizer.errors import (
+    Conflict,
+    IdempotencyConflict,
+    StoreUnavailable,
+    Unreadable,
+)
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.services.optimizer.store.tables import jobs
 from tests.examples.hostile import TOML, URDF, chain
@@ -314,3 +320,12 @@ def test_what_a_new_job_costs_is_not_asked_of_one_that_cannot_be_read(
 ) -> None:
     # Two designs in two scenarios, three times.
     assert JobService(store).estimate(spec()).walks == 12
+
+
+def test_a_damaged_time_is_reported_with_the_remedy(database: Path) -> None:
+    store = open_store(str(database))
+    job, _ = store.create_job(spec())
+    execute(str(database), "UPDATE jobs SET created_at = :document WHERE id = :id", "\0\0", job.id)
+    with pytest.raises(StoreUnavailable, match=r"a stored time is .*; put a backup"):
+        store.jobs()
+    store.close()

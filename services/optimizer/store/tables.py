@@ -15,6 +15,8 @@ import sqlalchemy as sa
 from sqlalchemy.sql.operators import OperatorType
 from sqlalchemy.types import TypeDecorator, TypeEngine
 
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+
 Row = Mapping[Any, Any]
 """Columns of a row by name."""
 
@@ -33,14 +35,22 @@ class UtcDateTime(TypeDecorator[datetime]):
         value = value.astimezone(UTC)
         return value.replace(tzinfo=None) if dialect.name == "sqlite" else value
 
-    def process_result_value(
-        self,
-        value: datetime | None,
-        dialect: sa.Dialect,  # noqa: ARG002
-    ) -> datetime | None:
-        if value is None:
-            return None
-        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+    def result_processor(self, dialect: sa.Dialect, coltype: object) -> Callable[[Any], Any] | None:
+        parse = self.impl_instance.result_processor(dialect, coltype)
+
+        def aware(raw: Any) -> datetime | None:
+            try:
+                value: datetime | None = raw if parse is None else parse(raw)
+            except (TypeError, ValueError) as error:
+                raise StoreUnavailable(
+                    f"the database is damaged: a stored time is {str(raw)[:40]!r}; put a backup in"
+                    " its place"
+                ) from error
+            if value is None:
+                return None
+            return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+        return aware
 
 
 class UnparsedText(str):

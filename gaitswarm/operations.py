@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Annotated
 
 from pydantic import Field
@@ -34,9 +35,16 @@ from gaitswarm.recordings import (
 )
 from gaitswarm.robots import RobotCheckView, RobotDraftRequest, RobotDraftView, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
-from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView
+from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView, convergence
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView
-from gaitswarm.services.optimizer.analysis.reference import JobReferenceView
+from gaitswarm.services.optimizer.analysis.distribution import distribution as spread
+from gaitswarm.services.optimizer.analysis.particles import encoded_particles
+from gaitswarm.services.optimizer.analysis.reference import (
+    JobReferenceView,
+    ReferenceView,
+    with_reference,
+)
+from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.firmware import parsed_table_bits
@@ -92,7 +100,9 @@ class ServedJobs(DatabaseJobs):
         Args:
             limit: Maximum number of iterations.
         """
-        return self._service.distribution(job_id, after=after, limit=limit)
+        job = self._service.job(job_id)
+        columns = self._service.columns(job).after(after)
+        return spread(columns, job.spec.design_space(), limit=limit)
 
     @analysis(
         "GET /jobs/{job_id}/particles",
@@ -123,9 +133,9 @@ class ServedJobs(DatabaseJobs):
             Length of the header (uint32), header (JSON, padded with spaces), then every column's
             numbers (float32), all little-endian.
         """
-        return self._service.particles(
-            job_id, after=after_iteration, most=max_points, objectives=objectives
-        )
+        job = self._service.job(job_id)
+        columns = self._service.columns(job).after(after_iteration)
+        return encoded_particles(job, columns, most=max_points, objectives=objectives)
 
     @analysis(
         "GET /jobs/{job_id}/reference",
@@ -139,7 +149,14 @@ class ServedJobs(DatabaseJobs):
 
         The reference is simulated once and stored with the job; job lists include it from then on.
         """
-        return self._service.reference(job_id)
+        job, reason = with_reference(self._service.store, self._service.job(job_id))
+        return JobReferenceView(
+            id=job.id,
+            reference=ReferenceView.from_reference(job.reference),
+            best_fitness=job.progress.best_fitness,
+            gain=job.gain,
+            reason=reason,
+        )
 
     @analysis(
         "GET /job-convergences", "list_convergences", "Get short convergences of jobs", page=True
@@ -156,7 +173,12 @@ class ServedJobs(DatabaseJobs):
             job: Job ids.
             points: Maximum number of iterations per job.
         """
-        return self._service.convergences(job, points)
+        views = []
+        for job_id in job:
+            # Jobs that were deleted meanwhile are left out.
+            with suppress(NotFound):
+                views.append(convergence(self._service.store, job_id, points))
+        return ConvergencesView(items=views)
 
     @analysis(
         "GET /jobs/{job_id}/firmware",

@@ -40,8 +40,8 @@ def stub() -> str:
     body = _indented(_BEGIN, *methods, "", "class AsyncDatabaseJobs(AsyncJobs):", run)
     names = {node.id for node in ast.walk(ast.parse(body)) if isinstance(node, ast.Name)}
     imports = _imports(base) | _imports(database)
-    imports |= {"AsyncIterator": "collections.abc", "Jobs": "gaitswarm.jobs.base"}
-    imports |= {"JobEvent": "gaitswarm.jobs.base", "Runs": "gaitswarm.jobs.base"}
+    imports |= {"AsyncIterator": "collections.abc"}
+    imports |= dict.fromkeys(("Jobs", "JobEvent", "Priority", "Runs"), "gaitswarm.jobs.base")
     modules = defaultdict(list)
     for name in sorted(names & imports.keys()):
         modules[imports[name]].append(name)

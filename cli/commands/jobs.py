@@ -166,23 +166,20 @@ def watch(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
 
 def pause(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Pause a job after its current iteration."""
-    return _commanded(jobs, job_id, "pause")
+    return _changed(jobs.pause(job_id))
 
 
 def resume(job_id: JobId, accept_changes: AcceptChanges = False, *, jobs: Jobs) -> Printed:
     """Resume a paused or failed job."""
-    return _commanded(jobs, job_id, "resume", accept_changes=accept_changes)
+    return _changed(jobs.resume(job_id, accept_changes=accept_changes))
 
 
 def cancel(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Cancel a job for good; committed iterations remain."""
-    return _commanded(jobs, job_id, "cancel")
+    return _changed(jobs.cancel(job_id))
 
 
-def _commanded(
-    jobs: Jobs, job_id: str, command: str, *, accept_changes: bool = False
-) -> tuple[JobView, str]:
-    job = jobs.command(job_id, command, accept_changes=accept_changes)
+def _changed(job: JobView) -> tuple[JobView, str]:
     return job, f"job {job.id} is {job.state}"
 
 

@@ -4,7 +4,7 @@ from types import TracebackType
 from typing import Self, Unpack
 
 from gaitswarm.firmware import FirmwareOptions, FirmwareView
-from gaitswarm.jobs.base import JobEvent, Jobs, Runs
+from gaitswarm.jobs.base import JobEvent, Jobs, Priority, Runs
 from gaitswarm.jobs.operation import Index
 from gaitswarm.recordings import RecordingEntryView, RecordingView
 from gaitswarm.replay import WalkReplay
@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
-from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
@@ -89,14 +89,11 @@ class AsyncJobs:
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]: ...
     async def job(self, job_id: str) -> JobView: ...
-    async def command(
-        self, job_id: str, command: Command | str, *, accept_changes: bool = False
-    ) -> JobView: ...
     async def pause(self, job_id: str) -> JobView: ...
     async def resume(self, job_id: str, *, accept_changes: bool = False) -> JobView: ...
     async def cancel(self, job_id: str) -> JobView: ...
     async def extend(self, job_id: str, iterations: int) -> JobView: ...
-    async def prioritize(self, job_id: str, priority: int) -> JobView: ...
+    async def prioritize(self, job_id: str, priority: Priority) -> JobView: ...
     async def label(
         self,
         job_id: str,

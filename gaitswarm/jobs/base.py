@@ -13,6 +13,7 @@ from itertools import islice
 from types import TracebackType
 from typing import Annotated, Any, Final, Self, TypeAlias, TypeVar, Unpack
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from gaitswarm.designs import SimulationRequest, resolved
@@ -47,24 +48,54 @@ from gaitswarm.robustness_index import (
     run_robustness,
     sampled_indices,
 )
-from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST, CertificateView
-from gaitswarm.services.optimizer.analysis.comparison import MOST_JOBS, JobComparisonView
+from gaitswarm.services.optimizer.analysis.certificate import (
+    MOST_WORST,
+    CertificateView,
+    certificate,
+)
+from gaitswarm.services.optimizer.analysis.comparison import (
+    MOST_JOBS,
+    JobComparisonView,
+    comparison,
+)
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
-from gaitswarm.services.optimizer.analysis.failures import FailuresView
-from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
-from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
-from gaitswarm.services.optimizer.analysis.importance import ImportanceView
+from gaitswarm.services.optimizer.analysis.failures import FailuresView, failures
+from gaitswarm.services.optimizer.analysis.front import (
+    FRONT_DESIGNS,
+    MOST_FRONT_DESIGNS,
+    FrontView,
+    pareto_front,
+)
+from gaitswarm.services.optimizer.analysis.identifiability import (
+    IdentifiabilityView,
+    check_comparable,
+    identifiability,
+)
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView, importance
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
     PreferencesRequest,
     RobustPreferencesView,
+    preference_for,
+    robust_preferences,
 )
-from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView
-from gaitswarm.services.optimizer.analysis.scenario_families import TOLERANCE, ScenarioFamiliesView
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
-from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
+from gaitswarm.services.optimizer.analysis.scenario_families import (
+    TOLERANCE,
+    ScenarioFamiliesView,
+    scenario_families,
+)
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
+from gaitswarm.services.optimizer.analysis.utilities import (
+    log_utilities,
+    objective_vectors,
+    require_success,
+    tuning_spec,
+)
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import (
     HIGHEST_PRIORITY,
     LARGEST_BUDGET,
@@ -73,8 +104,10 @@ from gaitswarm.services.optimizer.jobs.job import (
     Job,
     JobOrder,
     JobState,
-    check_priority,
 )
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.service import JobService
@@ -120,6 +153,9 @@ Runs: TypeAlias = Annotated[
 """Ids of jobs; a request has the first in its path."""
 
 
+Priority = Annotated[int, Field(strict=True, ge=LOWEST_PRIORITY, le=HIGHEST_PRIORITY, examples=[5])]
+
+
 class Submission(BaseModel):
     """What accompanies a new job.
 
@@ -131,7 +167,7 @@ class Submission(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     idempotency_key: str | None = None
-    priority: int = 0
+    priority: Priority = 0
     notify_url: str | None = None
 
     @field_validator("notify_url")
@@ -251,7 +287,8 @@ class Jobs(ABC):
             IdempotencyConflict: The key was used before for another job.
         """
         chosen = chosen_spec(spec, options)
-        return self._submit(chosen, _submission(idempotency_key, priority, notify_url))
+        given = {"idempotency_key": idempotency_key, "priority": priority, "notify_url": notify_url}
+        return self._submit(chosen, checked(Submission, given))
 
     def fork(
         self,
@@ -289,7 +326,8 @@ class Jobs(ABC):
             IdempotencyConflict: The key was used before for another job.
         """
         request = checked(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
-        return self._fork(job_id, request, _submission(idempotency_key, priority, notify_url))
+        given = {"idempotency_key": idempotency_key, "priority": priority, "notify_url": notify_url}
+        return self._fork(job_id, request, checked(Submission, given))
 
     def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
@@ -418,30 +456,6 @@ class Jobs(ABC):
         """
         return job_view(self._service, self._service.job(job_id))
 
-    def command(
-        self, job_id: str, command: Command | str, *, accept_changes: bool = False
-    ) -> JobView:
-        """Pause, resume or cancel a job.
-
-        Args:
-            command: "pause": end when the current iteration is committed; "resume": queue a paused
-                or failed job again; "cancel": end for good, committed iterations stay.
-            accept_changes: For "resume": whether the job continues although its provenance (code,
-                robot, compiler) has changed; the change is recorded with it.
-
-        Raises:
-            Conflict: The job's state does not allow it.
-            InvalidRequest: No such command.
-        """
-        if command == Command.PAUSE:
-            return self.pause(job_id)
-        if command == Command.RESUME:
-            return self.resume(job_id, accept_changes=accept_changes)
-        if command == Command.CANCEL:
-            return self.cancel(job_id)
-        commands = ", ".join(Command)
-        raise InvalidRequest(f"{command!r} is none of {commands}", field="command")
-
     @core("POST /jobs/{job_id}/pause", "pause_job", "Pause a job", access="command", status=202)
     def pause(self, job_id: str) -> JobView:
         """Pause a job. A running job first commits its current iteration (`pausing`).
@@ -530,9 +544,7 @@ class Jobs(ABC):
     def prioritize(
         self,
         job_id: str,
-        priority: Annotated[
-            int, Field(strict=True, ge=LOWEST_PRIORITY, le=HIGHEST_PRIORITY, examples=[5])
-        ],
+        priority: Priority,
     ) -> JobView:
         """Change the priority of a job that has not ended.
 
@@ -550,7 +562,9 @@ class Jobs(ABC):
         """
         self._context.check_priority(priority)
         actor = self._context.actor
-        return job_view(self._service, self._service.prioritize(job_id, priority, actor=actor))
+        return job_view(
+            self._service, self._service.store.prioritize(job_id, priority, actor=actor)
+        )
 
     @operations(
         "PATCH /jobs/{job_id}",
@@ -750,7 +764,15 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: An argument is invalid.
         """
-        return self._service.ranking(job_id, RankingRequest(preference=preference, top=top))
+        job = self._service.job(job_id)
+        if not isinstance(job.spec, JobSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only tuning jobs are judged by a"
+                " preference",
+                field="preference",
+            )
+        request = RankingRequest(preference=preference, top=top)
+        return rank(self._service.columns(job), job.spec, request)
 
     @analysis(
         "GET /jobs/{job_id}/scenarios", "get_scenario_families", "Get the importance of scenarios"
@@ -774,7 +796,17 @@ class Jobs(ABC):
             InvalidRequest: The tolerance is invalid.
             Conflict: No design of it succeeds in all scenarios.
         """
-        return self._service.scenarios(job_id, tolerance=tolerance)
+        spec, columns = self._tuning(job_id, "scenarios")
+        judged = log_utilities(columns, spec.resolved_preference())
+        if spec.worlds is not None:
+            judged = spec.worlds.aggregated(judged)
+        require_success(job_id, judged)
+        names = [scenario.name for scenario in spec.resolved_scenarios()]
+        return scenario_families(columns, judged, names, tolerance=tolerance)
+
+    def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
+        job = self._service.job(job_id)
+        return tuning_spec(job_id, job.spec, has), self._service.columns(job)
 
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> FailuresView:
@@ -786,7 +818,8 @@ class Jobs(ABC):
         Returns:
             Cases with failures, most failures first; each status with its latest design.
         """
-        return self._service.failures(job_id)
+        job = self._service.job(job_id)
+        return failures(self._service.columns(job), job.spec.case_names)
 
     @analysis("GET /jobs/{job_id}/importance", "get_importance", "Get the importance of variables")
     def importance(self, job_id: str) -> ImportanceView:
@@ -802,7 +835,17 @@ class Jobs(ABC):
         Raises:
             Conflict: It has no design yet.
         """
-        return self._service.importance(job_id)
+        job = self._service.job(job_id)
+        if job.spec.kind == "certificate":
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only a job that tunes a drive or fits"
+                " parameters has variables that may matter",
+                field="job_id",
+            )
+        columns = self._service.columns(job)
+        if not len(columns):
+            raise Conflict(f"job {job_id} has no design yet; try again after its first iteration")
+        return importance(job.spec, columns, self._service.store.best(job_id))
 
     @analysis("GET /jobs/{job_id}/comparison", "compare_jobs", "Compare jobs")
     def comparison(
@@ -824,7 +867,14 @@ class Jobs(ABC):
         Raises:
             InvalidRequest: There are none, too many, or one is named twice.
         """
-        return self._service.comparison(job_ids)
+        if len(set(job_ids)) < len(job_ids):
+            raise InvalidRequest("must name each job once", field="job_ids")
+        jobs = [self._service.job(job_id) for job_id in job_ids]
+        fitness = [
+            self._service.columns(job).fitness if job.progress.iterations else np.empty(0)
+            for job in jobs
+        ]
+        return comparison(self._service.store, jobs, fitness)
 
     @analysis(
         "POST /jobs/{job_id}/preferences",
@@ -873,10 +923,11 @@ class Jobs(ABC):
             seed=seed,
             precision=precision,
         )
-        limits = self._context.limits
-        limits.check_ranked(drawn, self._service.job(job_id))
+        limits, job = self._context.limits, self._service.job(job_id)
+        limits.check_ranked(drawn, job)
+        tuning_spec(job_id, job.spec, "a preference")
         index = partial(sampled_indices, check=limits.check_sampled)
-        return self._service.preferences(job_id, request, index)
+        return robust_preferences(job_id, job.spec, self._service.columns(job), request, index)
 
     @analysis("GET /jobs/{job_id}/front", "get_front", "Get the Pareto front")
     def front(
@@ -899,7 +950,10 @@ class Jobs(ABC):
             InvalidRequest: The number is invalid.
             Conflict: No design of it succeeds in all scenarios.
         """
-        return self._service.front(job_id, most=most)
+        spec, columns = self._tuning(job_id, "objectives to trade")
+        vectors = objective_vectors(columns, worlds=spec.worlds)
+        require_success(job_id, vectors)
+        return pareto_front(columns, vectors, spec, most=most)
 
     @analysis(
         "GET /jobs/{job_id}/preference-for", "get_preference_for", "Find a preference for a design"
@@ -920,7 +974,15 @@ class Jobs(ABC):
             NotFound: The job has no such design.
             Conflict: The design fails in a scenario.
         """
-        return self._service.preference_for(job_id, iteration, particle)
+        spec, columns = self._tuning(job_id, "objectives to trade")
+        rows = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
+        if not len(rows):
+            raise NotFound(f"job {job_id} has no design {iteration}.{particle}")
+        if not np.isfinite(objective_vectors(columns.rows(rows), worlds=spec.worlds)).all():
+            raise Conflict(
+                f"design {iteration}.{particle} fails in a scenario, so it wins under no preference"
+            )
+        return preference_for(columns, int(rows[0]), spec)
 
     @analysis(
         "GET /jobs/{job_id}/parameters", "get_parameters", "Get the identifiability of parameters"
@@ -941,7 +1003,10 @@ class Jobs(ABC):
             InvalidRequest: The jobs are of different problems, or have one seed.
             Conflict: One of them has no feasible design yet.
         """
-        return self._service.parameters(job_ids)
+        jobs = [self._service.job(job_id) for job_id in job_ids]
+        check_comparable(jobs)
+        runs, spec = [self._service.columns(job) for job in jobs], jobs[0].spec
+        return identifiability(job_ids, spec.design_space().variables, runs, spec.as_good_as)
 
     @analysis(
         "GET /jobs/{job_id}/targets",
@@ -964,7 +1029,20 @@ class Jobs(ABC):
             InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
             Conflict: One of them has no feasible design yet.
         """
-        return self._service.targets(job_ids, leave_out)
+        jobs = [self._service.job(job_id) for job_id in job_ids]
+        spec = jobs[0].spec
+        if not isinstance(spec, CalibrationSpec):
+            raise InvalidRequest(
+                f"job {jobs[0].id} is of kind {spec.kind}; only a calibration has targets",
+                field="job_id",
+            )
+        check_comparable(jobs)
+        bests = None
+        if spec.precision != "double":
+            stored = (self._service.store.best(job.id) for job in jobs)
+            bests = [best for best in stored if best is not None]
+        runs = [self._service.columns(job) for job in jobs]
+        return target_results(job_ids, spec, runs, leave_out, bests=bests)
 
     @analysis(
         "GET /jobs/{job_id}/certificate",
@@ -994,7 +1072,14 @@ class Jobs(ABC):
             InvalidRequest: An argument is invalid.
             Conflict: No world was simulated yet.
         """
-        return self._service.certificate(job_id, worlds=worlds, most=most)
+        job = self._service.job(job_id)
+        if not isinstance(job.spec, CertificateSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only a certificate has worlds",
+                field="job_id",
+            )
+        columns = self._service.columns(job)
+        return certificate(job_id, job.spec, columns, worlds=worlds, most=most)
 
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Write every evaluation of a job as a file.
@@ -1444,17 +1529,3 @@ def _items(page: Callable[..., PageView[V]], after: Any = None) -> Iterator[V]:
         if read.next is None:
             return
         after = read.next
-
-
-def _submission(idempotency_key: str | None, priority: int, notify_url: str | None) -> Submission:
-    _check_priority(priority)
-    return checked(
-        Submission,
-        {"idempotency_key": idempotency_key, "priority": priority, "notify_url": notify_url},
-    )
-
-
-def _check_priority(priority: int) -> None:
-    if type(priority) is not int:
-        raise InvalidRequest(f"must be an integer, it is {priority!r}", field="priority")
-    check_priority(priority)

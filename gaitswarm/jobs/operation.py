@@ -279,13 +279,7 @@ class Operation:
             return path, None
         if self.is_whole:
             return path, given[self.names[0]]
-        try:
-            return path, checked(self.request, given)
-        except InvalidRequest as error:
-            if not error.field.startswith("also"):
-                raise
-            message = str(error).removeprefix(f"{error.field}: ")
-            raise InvalidRequest(f"{message}, after the first", field="job_ids") from error
+        return path, checked(self.request, given)
 
     def arguments(self, path: Mapping[str, Any], request: Any) -> dict[str, Any]:
         """Return the arguments of the function for a validated request."""
@@ -330,7 +324,13 @@ def operation(tag: Tag, route: str, id: str, summary: str, **options: Any) -> Ca
             _, *given = bound.arguments.items()
             named = dict(given)
             rest = named.pop("options", {})
-            return jobs._answer(made, named | rest)  # noqa: SLF001
+            try:
+                return jobs._answer(made, named | rest)  # noqa: SLF001
+            except InvalidRequest as error:
+                if not error.field.startswith("also"):
+                    raise
+                message = str(error).removeprefix(f"{error.field}: ")
+                raise InvalidRequest(f"{message}, after the first", field="job_ids") from error
 
         call.operation = made  # type: ignore[attr-defined]
         return cast(F, call)

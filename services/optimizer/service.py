@@ -3,39 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
-from gaitswarm.services.optimizer.analysis.comparison import (
-    MOST_JOBS,
-    POINTS,
-    ConvergencesView,
-    ConvergenceView,
-    JobComparisonView,
-    comparison,
-    convergence,
-)
-from gaitswarm.services.optimizer.analysis.distribution import (
-    DistributionView,
-    distribution,
-)
-from gaitswarm.services.optimizer.analysis.failures import FailuresView, failures
 from gaitswarm.services.optimizer.analysis.fork import (
     Parent,
     check_begun,
     forked,
     with_start_designs,
-)
-from gaitswarm.services.optimizer.analysis.front import (
-    FRONT_DESIGNS,
-    MOST_FRONT_DESIGNS,
-    FrontView,
-    pareto_front,
 )
 from gaitswarm.services.optimizer.analysis.history import (
     PIECE,
@@ -43,45 +20,7 @@ from gaitswarm.services.optimizer.analysis.history import (
     read_columns,
     read_history,
 )
-from gaitswarm.services.optimizer.analysis.identifiability import (
-    IdentifiabilityView,
-    check_comparable,
-    identifiability,
-)
-from gaitswarm.services.optimizer.analysis.importance import ImportanceView, importance
-from gaitswarm.services.optimizer.analysis.particles import encoded_particles
-from gaitswarm.services.optimizer.analysis.preferences import (
-    Index,
-    PreferenceForView,
-    PreferencesRequest,
-    RobustPreferencesView,
-    preference_for,
-    robust_preferences,
-)
-from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
-from gaitswarm.services.optimizer.analysis.reference import (
-    JobReferenceView,
-    ReferenceView,
-    with_reference,
-)
-from gaitswarm.services.optimizer.analysis.scenario_families import (
-    TOLERANCE,
-    ScenarioFamiliesView,
-    scenario_families,
-)
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
-from gaitswarm.services.optimizer.analysis.utilities import (
-    log_utilities,
-    objective_vectors,
-    require_success,
-    tuning_spec,
-)
-from gaitswarm.services.optimizer.errors import (
-    Conflict,
-    InvalidRequest,
-    NotFound,
-    ProvenanceChanged,
-)
+from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
@@ -92,9 +31,6 @@ from gaitswarm.services.optimizer.jobs.estimate import (
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Iteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, Quota, check_priority, refusal
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
@@ -186,7 +122,7 @@ class JobService:
         parent = Parent(
             job,
             columns.rows(rows),
-            lambda: self.asked_positions(job, request.from_iteration),
+            lambda: self.store.asked(job_id, 0, request.from_iteration),
             last.digest,
         )
         spec, fork = forked(parent, request, self.provenance, longest=self.longest_fork)
@@ -264,10 +200,6 @@ class JobService:
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         return checked_length(spec, cases, self.longest_job)
 
-    def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
-        check_priority(priority)
-        return self.store.prioritize(job_id, priority, actor=actor)
-
     def columns(self, job: Job) -> EvaluationColumns:
         """Return every committed evaluation."""
         return self._histories.columns(job)
@@ -285,178 +217,3 @@ class JobService:
         included.
         """
         return read_history(self.store, job_id, after=after)
-
-    def reference(self, job_id: str) -> JobReferenceView:
-        """Compare a job's best design with its reference, which is simulated if needed."""
-        job, reason = with_reference(self.store, self.job(job_id))
-        return JobReferenceView(
-            id=job.id,
-            reference=ReferenceView.from_reference(job.reference),
-            best_fitness=job.progress.best_fitness,
-            gain=job.gain,
-            reason=reason,
-        )
-
-    def asked_positions(
-        self, job: Job, iterations: int | None = None
-    ) -> tuple[NDArray[np.float64], ...]:
-        """Return the (n, d) positions that the search asked for, by iteration."""
-        end = job.progress.iterations if iterations is None else iterations
-        return self.store.asked(job.id, 0, end)
-
-    def distribution(
-        self, job_id: str, *, after: int | None = None, limit: int
-    ) -> DistributionView:
-        """Return the spread of designs by iteration."""
-        job = self.job(job_id)
-        columns = self.columns(job).after(after)
-        return distribution(columns, job.spec.design_space(), limit=limit)
-
-    def particles(
-        self, job_id: str, *, after: int | None = None, most: int, objectives: bool = False
-    ) -> bytes:
-        """Encode evaluations as columns: a `ParticlesHeaderView`, then float32 numbers."""
-        job = self.job(job_id)
-        columns = self.columns(job).after(after)
-        return encoded_particles(job, columns, most=most, objectives=objectives)
-
-    def scenarios(self, job_id: str, *, tolerance: float = TOLERANCE) -> ScenarioFamiliesView:
-        """Judge a tuning job's designs by fewer scenarios."""
-        if not 0.0 <= tolerance < math.inf:
-            raise InvalidRequest("must be at least 0", field="tolerance")
-        spec, columns = self._tuning(job_id, "scenarios")
-        judged = log_utilities(columns, spec.resolved_preference())
-        if spec.worlds is not None:
-            judged = spec.worlds.aggregated(judged)
-        require_success(job_id, judged)
-        names = [scenario.name for scenario in spec.resolved_scenarios()]
-        return scenario_families(columns, judged, names, tolerance=tolerance)
-
-    def failures(self, job_id: str) -> FailuresView:
-        """Count a job's failed designs by case and status."""
-        job = self.job(job_id)
-        return failures(self.columns(job), job.spec.case_names)
-
-    def importance(self, job_id: str) -> ImportanceView:
-        """Estimate which variables of a job matter."""
-        job = self.job(job_id)
-        if job.spec.kind == "certificate":
-            raise InvalidRequest(
-                f"job {job_id} is of kind {job.spec.kind}; only a job that tunes a drive or fits"
-                " parameters has variables that may matter",
-                field="job_id",
-            )
-        columns = self.columns(job)
-        if not len(columns):
-            raise Conflict(f"job {job_id} has no design yet; try again after its first iteration")
-        return importance(job.spec, columns, self.store.best(job_id))
-
-    def front(self, job_id: str, *, most: int = FRONT_DESIGNS) -> FrontView:
-        """Find the Pareto front of a tuning job over f1 to f5; `most` designs of it are listed."""
-        if not 1 <= most <= MOST_FRONT_DESIGNS:
-            raise InvalidRequest(f"must be 1 to {MOST_FRONT_DESIGNS}", field="most")
-        spec, columns = self._tuning(job_id, "objectives to trade")
-        vectors = objective_vectors(columns, worlds=spec.worlds)
-        require_success(job_id, vectors)
-        return pareto_front(columns, vectors, spec, most=most)
-
-    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
-        """Find preferences under which a design wins its job."""
-        for name, number in (("iteration", iteration), ("particle", particle)):
-            if number < 0:
-                raise InvalidRequest("must be at least 0", field=name)
-        spec, columns = self._tuning(job_id, "objectives to trade")
-        rows = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
-        if not len(rows):
-            raise NotFound(f"job {job_id} has no design {iteration}.{particle}")
-        if not np.isfinite(objective_vectors(columns.rows(rows), worlds=spec.worlds)).all():
-            raise Conflict(
-                f"design {iteration}.{particle} fails in a scenario, so it wins under no preference"
-            )
-        return preference_for(columns, int(rows[0]), spec)
-
-    def preferences(
-        self, job_id: str, request: PreferencesRequest, index: Index
-    ) -> RobustPreferencesView:
-        """Find the preference whose winner among a job's designs is the most robust."""
-        job = self.job(job_id)
-        tuning_spec(job_id, job.spec, "a preference")
-        return robust_preferences(job_id, job.spec, self.columns(job), request, index)
-
-    def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
-        job = self.job(job_id)
-        return tuning_spec(job_id, job.spec, has), self.columns(job)
-
-    def ranking(self, job_id: str, request: RankingRequest) -> RankingView:
-        """Rank all designs of a tuning job by another preference, from stored objectives."""
-        job = self.job(job_id)
-        if not isinstance(job.spec, JobSpec):
-            raise InvalidRequest(
-                f"job {job_id} is of kind {job.spec.kind}; only tuning jobs are judged by a"
-                " preference",
-                field="preference",
-            )
-        return rank(self.columns(job), job.spec, request)
-
-    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
-        """Determine the parameters on which several runs of one problem agree."""
-        jobs = [self.job(job_id) for job_id in job_ids]
-        check_comparable(jobs)
-        runs, spec = [self.columns(job) for job in jobs], jobs[0].spec
-        return identifiability(job_ids, spec.design_space().variables, runs, spec.as_good_as)
-
-    def targets(self, job_ids: Sequence[str], leave_out: LeaveOut | None = None) -> TargetsView:
-        """Compare the best design of several runs of a calibration with their targets."""
-        jobs = [self.job(job_id) for job_id in job_ids]
-        spec = jobs[0].spec
-        if not isinstance(spec, CalibrationSpec):
-            raise InvalidRequest(
-                f"job {jobs[0].id} is of kind {spec.kind}; only a calibration has targets",
-                field="job_id",
-            )
-        check_comparable(jobs)
-        bests = None
-        if spec.precision != "double":
-            bests = [best for job in jobs if (best := self.store.best(job.id)) is not None]
-        runs = [self.columns(job) for job in jobs]
-        return target_results(job_ids, spec, runs, leave_out, bests=bests)
-
-    def certificate(
-        self, job_id: str, *, worlds: int | None = None, most: int = 5
-    ) -> CertificateView:
-        """Summarize a certificate, from its first `worlds` worlds; list the `most` worst."""
-        job = self.job(job_id)
-        if not isinstance(job.spec, CertificateSpec):
-            raise InvalidRequest(
-                f"job {job_id} is of kind {job.spec.kind}; only a certificate has worlds",
-                field="job_id",
-            )
-        return certificate(job_id, job.spec, self.columns(job), worlds=worlds, most=most)
-
-    def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
-        """Compare jobs by convergence, distribution of fitness, and spec."""
-        if len(set(job_ids)) < len(job_ids) or len(job_ids) > MOST_JOBS:
-            raise InvalidRequest(f"must be at most {MOST_JOBS} jobs, each once", field="job_ids")
-        jobs = [self.job(job_id) for job_id in job_ids]
-        fitness = [
-            self.columns(job).fitness if job.progress.iterations else np.empty(0) for job in jobs
-        ]
-        return comparison(jobs, fitness, [self._convergence(job.id, POINTS) for job in jobs])
-
-    def convergences(self, job_ids: Sequence[str], points: int) -> ConvergencesView:
-        """List the convergence of jobs that were not deleted, thinned to some points."""
-        views = []
-        for job_id in job_ids:
-            with suppress(NotFound):
-                views.append(self._convergence(job_id, points))
-        return ConvergencesView(items=views)
-
-    def _convergence(self, job_id: str, points: int) -> ConvergenceView:
-        iterations: list[Iteration] = []
-        after: int | None = None
-        while True:
-            page = self.store.iterations(job_id, after=after, limit=_PAGE)
-            iterations += page.items
-            if page.next is None or not page.items:
-                return convergence(job_id, iterations, points)
-            after = page.items[-1].index

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 
+from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.services.optimizer.analysis.identifiability import Trust
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
@@ -91,44 +92,47 @@ def test_a_job_stopped_half_way_ends_with_the_same_bits(store: Store, twin: Twin
 
 @pytest.mark.slow
 def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: Store, twin: Twin) -> None:
-    recording, service = store.add_recording(twin.recording), JobService(store)
+    recording = store.add_recording(twin.recording)
+    jobs = DatabaseJobs(JobService(store), "")
     brief = {
         "variables": ("battery_voltage", "damping_left_rear"),
         "iterations": 6,
         "optimizer": PsoSettings(particles=8),
     }
-    jobs = [
+    ids = [
         finished(store, spec(recording, seed=seed, name=f"run {seed}", **brief)) for seed in (1, 2)
     ]
-    found = service.parameters(jobs)
+    found = jobs.parameters(ids)
     assert [p.name for p in found.parameters] == ["battery_voltage", "damping_left_rear"]
-    assert found.fitness == [store.job(job).progress.best_fitness for job in jobs]
+    assert found.fitness == [store.job(job).progress.best_fitness for job in ids]
     # Two short runs find much the same battery; a sole's damping hardly shows in the currents.
     battery, damping = found.parameters
     assert battery.trust in (Trust.TRUSTED, Trust.ROUGH)
     assert damping.trust is Trust.UNKNOWN
-    assert [p.trust for p in service.parameters(jobs[:1]).parameters] == [None, None]
+    assert [p.trust for p in jobs.parameters(ids[:1]).parameters] == [None, None]
 
 
 def test_runs_of_different_problems_are_not_compared(store: Store, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
+    jobs = DatabaseJobs(service, "")
     first, _ = service.submit(spec(recording))
     other, _ = service.submit(spec(recording, links=(1,), seed=2))
     with pytest.raises(InvalidRequest, match="another problem") as refused:
-        service.parameters([first.id, other.id])
-    assert refused.value.field == "also"
+        jobs.parameters([first.id, other.id])
+    assert refused.value.field == "job_ids"
     with pytest.raises(Conflict, match="no successful design yet"):
-        service.parameters([first.id])
+        jobs.parameters([first.id])
 
 
 def test_a_run_is_no_evidence_for_itself(store: Store, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
+    jobs = DatabaseJobs(service, "")
     first, _ = service.submit(spec(recording))
     again, _ = service.submit(spec(recording, iterations=20))
     for other in (first, again):
         with pytest.raises(InvalidRequest, match="has the seed of job") as refused:
-            service.parameters([first.id, other.id])
-        assert refused.value.field == "also"
+            jobs.parameters([first.id, other.id])
+        assert refused.value.field == "job_ids"
 
 
 @pytest.mark.parametrize(

@@ -126,7 +126,6 @@ def test_a_list_longer_than_a_page_is_whole(reach: Reach, many_jobs: Path) -> No
 REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
     "unknown state": (lambda jobs, _: list(jobs.jobs(state="flying")), "state"),
     "unknown order": (lambda jobs, _: list(jobs.jobs(order="age")), "order"),
-    "unknown command": (lambda jobs, job: jobs.command(job, "fly"), "command"),
     "unknown format": (lambda jobs, job: list(jobs.export(job, cast(Any, "xlsx"))), "file_format"),
     "unknown preference": (lambda jobs, job: jobs.ranking(job, cast(Any, "Z")), "preference"),
     "rank nothing": (lambda jobs, job: jobs.ranking(job, "A", top=0), "top"),
@@ -199,7 +198,7 @@ def test_commands_change_the_state_until_the_job_has_ended(reach: Reach, db: Pat
     with pytest.raises(gaitswarm.Conflict, match="cannot pause a job that is paused"):
         jobs.pause(job.id)
     assert jobs.resume(job.id).state == "queued"
-    assert jobs.command(job.id, "pause").state == "paused"
+    assert jobs.pause(job.id).state == "paused"
     assert jobs.cancel(job.id).state == "cancelled"
     with pytest.raises(gaitswarm.Conflict):
         jobs.extend(job.id, 9)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.services.optimizer.analysis.certificate import conditional_value_at_risk
-from gaitswarm.services.optimizer.analysis.ranking import RankingRequest
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import JobState
@@ -116,7 +116,7 @@ def test_it_is_ranked_by_another_preference_over_its_worlds(
     ids = [service.submit(robust().model_copy(update={"preference": p}))[0].id for p in "AB"]
     for job_id in ids:
         run_embedded(store, evaluator, job_id)
-    ranked = service.ranking(ids[0], RankingRequest(preference="B", top=8))
+    ranked = DatabaseJobs(service, "").ranking(ids[0], "B", top=8)
     first = min(ranked.top, key=lambda design: (design.iteration, design.particle))
     by_b = store.evaluations_between(ids[1], 0, 1)
     assert (first.iteration, first.particle) == (0, 0)

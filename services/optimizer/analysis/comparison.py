@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,17 @@ from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable
 
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
+
 MOST_JOBS: Final = 12
 """Jobs that can be compared at once."""
 
 POINTS: Final = 400
 """Iterations of a job that are listed at most."""
+
+_PAGE: Final = 5000
+"""Iterations read at a time."""
 
 _SHARES: Final = np.linspace(0.0, 1.0, 101)
 
@@ -105,11 +111,10 @@ class JobComparisonView(View):
 
 
 def comparison(
-    jobs: Sequence[Job],
-    fitness: Sequence[NDArray[np.float64]],
-    convergences: Sequence[ConvergenceView],
+    store: Store, jobs: Sequence[Job], fitness: Sequence[NDArray[np.float64]]
 ) -> JobComparisonView:
     """Compare jobs by the fitness (r,) of their designs, +inf for failed ones."""
+    convergences = [convergence(store, job.id, POINTS) for job in jobs]
     differences = list(_differences([job.spec.model_dump(mode="json") for job in jobs]))
     return JobComparisonView(
         jobs=[_compared(*parts) for parts in zip(jobs, fitness, convergences, strict=True)],
@@ -137,8 +142,16 @@ def _compared(
     )
 
 
-def convergence(job_id: str, iterations: Sequence[Iteration], points: int) -> ConvergenceView:
+def convergence(store: Store, job_id: str, points: int) -> ConvergenceView:
     """Thin a job's iterations to some points."""
+    iterations: list[Iteration] = []
+    after: int | None = None
+    while True:
+        page = store.iterations(job_id, after=after, limit=_PAGE)
+        iterations += page.items
+        if page.next is None or not page.items:
+            break
+        after = page.items[-1].index
     count = len(iterations)
     evaluations = np.cumsum([i.designs for i in iterations], dtype=np.int64)
     seconds = np.cumsum([i.evaluate_seconds for i in iterations], dtype=np.float64)

@@ -1,20 +1,59 @@
-"""Jobs for programs with an event loop: methods of `Jobs`, called in threads.
-
-scripts/async_stub.py writes the types of this module.
-"""
+"""Jobs for programs with an event loop: methods of `Jobs`, called in threads."""
 
 from __future__ import annotations
 
-import inspect
 import threading
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import aclosing, suppress
 from functools import partial, wraps
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar, cast
 
 import anyio
 from anyio import from_thread, to_thread
 from anyio.lowlevel import checkpoint
 
-from gaitswarm.jobs.base import Jobs, Stop
+from gaitswarm.jobs.base import JobEvent, Jobs, Stop
+from gaitswarm.views.history import IterationView
+from gaitswarm.views.job import JobView
+
+if TYPE_CHECKING:
+    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.services.optimizer.run.evaluator import Evaluator
+    from gaitswarm.services.runtime import EvaluatorKind
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def _awaited(
+    method: Callable[Concatenate[Jobs, P], T],
+) -> Callable[Concatenate[AsyncJobs, P], Coroutine[Any, Any, T]]:
+    """Make a coroutine function of a method."""
+
+    @wraps(method)
+    async def call(self: AsyncJobs, /, *arguments: P.args, **options: P.kwargs) -> T:
+        jobs = await self._jobs()
+        work = partial(getattr(jobs, method.__name__), *arguments, **options)
+        return cast(T, await to_thread.run_sync(work, abandon_on_cancel=True))
+
+    return call
+
+
+def _iterated(
+    method: Callable[Concatenate[Jobs, P], Iterator[T]],
+) -> Callable[Concatenate[AsyncJobs, P], AsyncIterator[T]]:
+    """Make an asynchronous generator function of an iterator."""
+    begin = _awaited(method)
+
+    @wraps(method)
+    async def iterate(
+        self: AsyncJobs, /, *arguments: P.args, **options: P.kwargs
+    ) -> AsyncIterator[T]:
+        async for item in _items(await begin(self, *arguments, **options)):
+            yield item
+
+    return iterate
 
 
 class AsyncJobs:
@@ -27,76 +66,98 @@ class AsyncJobs:
     `contextlib.aclosing`.
     """
 
-    def __init__(self, connect, url):
+    def __init__(self, connect: Callable[[], Jobs], url: str) -> None:
         """connect: opens the jobs; called once, in a thread, on entering or at first use."""
         self._connect = connect
         self._url = url
-        self._opened = None
+        self._opened: Jobs | None = None
         self._opening = anyio.Lock()
 
     @property
-    def url(self):
+    def url(self) -> str:
         """URL of the server, or file or URL of the database."""
         return self._url
 
-    @wraps(Jobs.follow)
-    async def follow(self, job_id, *, after=None):
+    submit = _awaited(Jobs.submit)
+    fork = _awaited(Jobs.fork)
+    estimate = _awaited(Jobs.estimate)
+    jobs = _iterated(Jobs.jobs)
+    job = _awaited(Jobs.job)
+    pause = _awaited(Jobs.pause)
+    resume = _awaited(Jobs.resume)
+    cancel = _awaited(Jobs.cancel)
+    extend = _awaited(Jobs.extend)
+    prioritize = _awaited(Jobs.prioritize)
+    label = _awaited(Jobs.label)
+    keep = _awaited(Jobs.keep)
+    delete = _awaited(Jobs.delete)
+    best = _awaited(Jobs.best)
+    iterations = _iterated(Jobs.iterations)
+    history = _iterated(Jobs.history)
+    evaluations = _awaited(Jobs.evaluations)
+    ranking = _awaited(Jobs.ranking)
+    scenarios = _awaited(Jobs.scenarios)
+    failures = _awaited(Jobs.failures)
+    importance = _awaited(Jobs.importance)
+    comparison = _awaited(Jobs.comparison)
+    preferences = _awaited(Jobs.preferences)
+    front = _awaited(Jobs.front)
+    preference_for = _awaited(Jobs.preference_for)
+    parameters = _awaited(Jobs.parameters)
+    targets = _awaited(Jobs.targets)
+    certificate = _awaited(Jobs.certificate)
+    export = _iterated(Jobs.export)
+    evidence = _awaited(Jobs.evidence)
+    verify = _awaited(Jobs.verify)
+    record = _awaited(Jobs.record)
+    recordings = _iterated(Jobs.recordings)
+    recording = _awaited(Jobs.recording)
+    simulate = _awaited(Jobs.simulate)
+    robustness = _awaited(Jobs.robustness)
+    replay = _awaited(Jobs.replay)
+    surface = _awaited(Jobs.surface)
+    write_firmware = _awaited(Jobs.write_firmware)
+
+    async def follow(
+        self, job_id: str, *, after: int | None = None
+    ) -> AsyncGenerator[JobEvent, None]:
         jobs, stop = await self._jobs(), Stop()
         events = jobs._follow(job_id, after, stop)  # noqa: SLF001
         try:
             # A thread of its own: streams that wait must not occupy those of other calls.
-            async for event in _iterated(events, anyio.CapacityLimiter(1)):
+            async for event in _items(events, anyio.CapacityLimiter(1)):
                 yield event
         finally:
             stop.set()
 
-    @wraps(Jobs.wait)
-    async def wait(self, job_id):
+    async def wait(self, job_id: str) -> JobView:
         job = await self.job(job_id)
         async with aclosing(self.follow(job_id, after=job.last_iteration)) as events:
             async for _ in events:
                 pass
         return await self.job(job_id)
 
-    @wraps(Jobs.close)
-    async def close(self):
+    async def close(self) -> None:
         if self._opened is not None:
             await to_thread.run_sync(self._opened.close)
 
-    async def __aenter__(self):
+    async def __aenter__(self) -> Self:
         await self._jobs()
         return self
 
-    async def __aexit__(self, kind, error, traceback):
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
         await self.close()
 
-    async def _jobs(self):
+    async def _jobs(self) -> Jobs:
         async with self._opening:
             if self._opened is None:
                 self._opened = await to_thread.run_sync(self._connect)
             return self._opened
-
-
-def _adapted(name, method):
-    """Make a coroutine function of a method, or an asynchronous generator of an iterator."""
-
-    @wraps(method)
-    async def call(self, *arguments, **options):
-        jobs = await self._jobs()
-        work = partial(getattr(jobs, name), *arguments, **options)
-        return await to_thread.run_sync(work, abandon_on_cancel=True)
-
-    @wraps(method)
-    async def iterate(self, *arguments, **options):
-        async for item in _iterated(await call(self, *arguments, **options)):
-            yield item
-
-    return iterate if method.__annotations__["return"].startswith("Iterator[") else call
-
-
-for _name, _method in inspect.getmembers(Jobs, inspect.isfunction):
-    if not _name.startswith("_") and _name not in vars(AsyncJobs):
-        setattr(AsyncJobs, _name, _adapted(_name, _method))
 
 
 class AsyncDatabaseJobs(AsyncJobs):
@@ -104,14 +165,14 @@ class AsyncDatabaseJobs(AsyncJobs):
 
     async def run(
         self,
-        job_id,
+        job_id: str,
         *,
-        evaluator="auto",
-        cpus=None,
-        ray_address=None,
-        accept_changes=False,
-        on_iteration=None,
-    ):
+        evaluator: EvaluatorKind | Evaluator = "auto",
+        cpus: int | None = None,
+        ray_address: str | None = None,
+        accept_changes: bool = False,
+        on_iteration: Callable[[IterationView], None] | None = None,
+    ) -> JobView:
         """Run a job in a thread; where this is cancelled, the job is returned to the queue first.
 
         Args:
@@ -131,13 +192,13 @@ class AsyncDatabaseJobs(AsyncJobs):
             ProvenanceChanged: The provenance has changed, which is not accepted.
             EvaluatorUnavailable: The cluster cannot be reached.
         """
-        jobs, stop = await self._jobs(), threading.Event()
+        jobs, stop = cast("DatabaseJobs", await self._jobs()), threading.Event()
 
-        def committed(iteration):
+        def committed(iteration: IterationView) -> None:
             if on_iteration is not None and not stop.is_set():
                 from_thread.run_sync(on_iteration, iteration)
 
-        async def stop_with_the_task():
+        async def stop_with_the_task() -> None:
             try:
                 await anyio.sleep_forever()
             finally:
@@ -166,10 +227,12 @@ class AsyncDatabaseJobs(AsyncJobs):
         await checkpoint()
         if error is not None:
             raise error
-        return ended
+        return cast(JobView, ended)
 
 
-async def _iterated(items, limiter=None):
+async def _items(
+    items: Iterator[T], limiter: anyio.CapacityLimiter | None = None
+) -> AsyncIterator[T]:
     """Yield the items of an iterator, each computed in a thread."""
     compute = partial(to_thread.run_sync, _next, items, abandon_on_cancel=True, limiter=limiter)
     try:
@@ -178,10 +241,10 @@ async def _iterated(items, limiter=None):
     finally:
         # A generator that an abandoned thread executes cannot be closed; it ends with its thread.
         with suppress(AttributeError, ValueError):
-            items.close()
+            items.close()  # type: ignore[attr-defined]
 
 
-def _next(items):
+def _next(items: Iterator[T]) -> tuple[()] | tuple[T]:
     """Return the next item, or nothing: StopIteration cannot leave a thread."""
     for item in items:
         return (item,)

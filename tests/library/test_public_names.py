@@ -18,7 +18,6 @@ import pytest
 
 import gaitswarm
 from gaitswarm.services.optimizer.search.registry import METHODS
-from scripts import async_stub
 from tests.examples.paths import ROOT
 from tests.examples.processes import python
 
@@ -72,13 +71,6 @@ def test_jobs_have_the_same_methods_for_programs_with_an_event_loop() -> None:
     assert blocking.keys() == others.keys()
     for name, signature in blocking.items():
         assert signature.parameters == others[name].parameters
-
-
-def test_types_of_the_asynchronous_methods_are_up_to_date() -> None:
-    def statements(text: str) -> list[str]:
-        return sorted(map(ast.unparse, ast.parse(text).body))
-
-    assert statements(async_stub.stub()) == statements(async_stub.STUB.read_text(encoding="utf-8"))
 
 
 def documented() -> Iterator[tuple[str, Any]]:

@@ -57,6 +57,8 @@ def ask(jobs: gaitswarm.Jobs) -> None:
 async def ask_in_a_task(jobs: gaitswarm.AsyncJobs) -> None:
     job = await jobs.submit(gaitswarm.JobSpec(controller="pi"), seed=2)
     assert_type(job, gaitswarm.JobView)
+    await jobs.submit(sed=2)  # type: ignore[call-arg]
+    await jobs.front(job.id, most="1")  # type: ignore[arg-type]
     async for iteration in jobs.iterations(job.id):
         assert_type(iteration, gaitswarm.IterationView)
     async with gaitswarm.open_async("jobs.db") as here:

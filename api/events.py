@@ -23,8 +23,7 @@ from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.views.history import IterationView
-from gaitswarm.views.job import StateView
+from gaitswarm.views.job import IterationView, StateView
 
 Revocation = Callable[[], Awaitable[None]]
 """Returns when the token of a request was revoked."""

@@ -136,7 +136,7 @@ def _set_start(fields: dict[str, Any], data: Mapping[str, Any]) -> None:
         raise InvalidRequest("requires --start-from", field="start-count")
     if "start" in data:
         raise InvalidRequest("the spec already has a start; choose one", field="start-from")
-    from gaitswarm.start import start_from
+    from gaitswarm.specs import start_from
 
     fields["start"] = start_from(source, count)
 

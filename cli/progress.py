@@ -123,7 +123,7 @@ def show_progress(progress: Progress) -> Iterator[Progress]:
 
 def watch_with_progress(jobs: Jobs, job_id: str) -> None:
     """Follow a job until it ends; raise JobEnded unless it succeeds."""
-    from gaitswarm.views.history import IterationView
+    from gaitswarm.views.job import IterationView
 
     job = jobs.job(job_id)
     with show_progress(
@@ -144,7 +144,7 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
 
 def watch_as_json(jobs: Jobs, job_id: str) -> None:
     """Follow a job as JSON lines: `{"event": "iteration"|"state", "data": {...}}`."""
-    from gaitswarm.views.history import IterationView
+    from gaitswarm.views.job import IterationView
 
     last: StateView | None = None
     for event in jobs.follow(job_id):

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from gaitswarm.sim.outcome import Objective
     from gaitswarm.sim.variables import Variable
     from gaitswarm.simulation import PlannedGaitView, SimulationView
-    from gaitswarm.views.history import BestView
-    from gaitswarm.views.job import JobSummaryView, JobView, Spent
+    from gaitswarm.views.job import BestView, JobSummaryView, JobView, Spent
 
 MISSING: Final = "–"
 

@@ -67,8 +67,14 @@ from gaitswarm.simulation import ScenarioResult, SimulationResult, simulate
 from gaitswarm.specs import SpecOptions, job_spec
 from gaitswarm.surface import SurfaceView
 from gaitswarm.tables import EvaluationTable, Table
-from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
-from gaitswarm.views.job import JobSummaryView, JobView, StateView
+from gaitswarm.views.job import (
+    BestView,
+    HistoryIterationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    StateView,
+)
 from gaitswarm.views.verification import VerificationView
 
 __all__ = [

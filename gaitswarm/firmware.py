@@ -31,7 +31,7 @@ from gaitswarm.sim.firmware import (
 )
 from gaitswarm.sim.input import Line
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
-from gaitswarm.views.history import BestView
+from gaitswarm.views.job import BestView
 
 _BUILT: Final = "build"
 """Build folder of the folder's Makefile."""

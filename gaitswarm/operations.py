@@ -66,8 +66,7 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.history import BestView
-from gaitswarm.views.job import JobFacetsView
+from gaitswarm.views.job import BestView, JobFacetsView
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import zipped

@@ -24,17 +24,14 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences as ranked_preferences,
 )
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
-from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.outcome import Status
 from gaitswarm.specs import SpecInput, SpecOptions, checked, job_spec
 from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views.catalogue import OptimizerView, optimizer_views
-from gaitswarm.views.history import BestView, IterationView
-from gaitswarm.views.job import JobView
+from gaitswarm.views.job import BestView, IterationView, JobView
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,15 +229,7 @@ def robust_preferences(
         "seed": seed,
         "precision": precision,
     }
-    request, table = checked(PreferencesRequest, document), jobs.evaluations(job_id)
-    columns = EvaluationColumns(
-        table.iteration,
-        table.particle,
-        table.designs,
-        table.objectives,
-        # Rankings do not distinguish failures.
-        np.where(table.statuses == Status.OK.label, Status.OK, Status.FELL).astype(np.uint8),
-        np.where(np.isfinite(table.fitness), table.fitness, np.inf),
-    )
+    request = checked(PreferencesRequest, document)
+    columns = jobs.evaluations(job_id).evaluations
     index = partial(sampled_indices, progress=progress)
     return ranked_preferences(job_id, jobs.job(job_id).spec, columns, request, index)

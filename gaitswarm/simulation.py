@@ -164,12 +164,8 @@ class SimulationResult:
             "status": np.array([Status(s).label for s in self.statuses.ravel().tolist()]),
             "utility": self.utilities.ravel(),
         }
-        columns |= {
-            name: self.objectives[:, :, m].ravel() for m, name in enumerate(OBJECTIVE_NAMES)
-        }
-        columns |= {
-            name: self.measurements[:, :, m].ravel() for m, name in enumerate(MEASUREMENT_NAMES)
-        }
+        results = np.concatenate([self.objectives, self.measurements], axis=2).reshape(n * k, -1)
+        columns |= dict(zip((*OBJECTIVE_NAMES, *MEASUREMENT_NAMES), results.T, strict=True))
         for name, values in zip(self.variables, self.designs.T, strict=True):
             columns[f"design.{name}"] = np.repeat(values, k)
         return Table(columns)
@@ -534,11 +530,16 @@ def evaluated(
 
 
 def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floats]:
-    """(n,) values by variable."""
+    """(n,) values by variable; choices as their indices."""
+    catalogue = design_catalogue(controller) if controller in CONTROLLERS else {}
+    arrays = {}
     try:
-        found = _indexed(_by_variable(designs), controller)
-        arrays = [np.atleast_1d(np.asarray(values, np.float64)) for values in found.values()]
-        columns = np.broadcast_arrays(*arrays)
+        for name, values in _by_variable(designs).items():
+            given, variable = np.atleast_1d(np.asarray(values)), catalogue.get(name)
+            if variable is not None and variable.kind == "categorical" and given.dtype.kind in "UO":
+                given = np.array([variable.number(choice) for choice in given.tolist()])
+            arrays[name] = given.astype(np.float64)
+        columns = np.broadcast_arrays(*arrays.values())
     except (TypeError, ValueError, AttributeError, KeyError) as error:
         raise InvalidRequest(
             "must be one design as a mapping of numbers, or many as a mapping of arrays of one"
@@ -549,18 +550,7 @@ def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floa
         raise InvalidRequest("must have at least one design", field="designs")
     if columns[0].ndim > 1:
         raise InvalidRequest("values of a variable must have one axis", field="designs")
-    return dict(zip(found, columns, strict=True))
-
-
-def _indexed(columns: dict[str, ArrayLike], controller: ControllerName) -> dict[str, ArrayLike]:
-    """Replace names of choices by their indices."""
-    known = design_catalogue(controller) if controller in CONTROLLERS else {}
-    found = dict(columns)
-    for name, values in columns.items():
-        given = np.asarray(values)
-        if name in known and known[name].kind == "categorical" and given.dtype.kind in "UO":
-            found[name] = [known[name].number(value) for value in np.atleast_1d(given).tolist()]
-    return found
+    return dict(zip(arrays, columns, strict=True))
 
 
 def _by_variable(designs: DesignInput) -> dict[str, ArrayLike]:

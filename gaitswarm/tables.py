@@ -9,7 +9,7 @@ an array, null in Arrow, Parquet and pandas, and empty in CSV; floats are exact 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 import numpy as np
@@ -107,11 +107,11 @@ class EvaluationTable(Table):
         objective_names: Names of the m objectives of a case.
     """
 
-    def __init__(self, columns: Mapping[str, Column], spec: Spec) -> None:
+    def __init__(self, spec: Spec, evaluations: EvaluationColumns) -> None:
         """Make a table of a job's evaluations."""
-        super().__init__(columns)
-        self._known = spec.design_space().columns
-        self.variables = tuple(variable.name for variable in self._known)
+        super().__init__(_flat(spec, evaluations))
+        self.evaluations = evaluations
+        self.variables = tuple(variable.name for variable in spec.design_space().columns)
         self.cases = spec.case_names
         self.objective_names = tuple(objective.name for objective in spec.objectives)
 
@@ -124,8 +124,7 @@ class EvaluationTable(Table):
             pieces: The evaluations by pieces, in order.
         """
         # Without any piece the columns still exist.
-        found = [_flat(spec, _no_rows(spec)), *(_flat(spec, piece) for piece in pieces)]
-        return cls({name: np.concatenate([f[name] for f in found]) for name in found[0]}, spec)
+        return cls(spec, joined([_no_rows(spec), *pieces]))
 
     @classmethod
     def from_parquet(cls, spec: Spec, content: bytes) -> Self:
@@ -135,22 +134,17 @@ class EvaluationTable(Table):
             spec: Spec of the job whose evaluations are in the file.
             content: The whole file.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        table = pq.read_table(pa.BufferReader(content))
-        columns = {name: _numpy(table.column(name)) for name in table.column_names}
-        return cls(columns, spec)
+        return cls(spec, decoded_table(spec, content))
 
     @property
     def iteration(self) -> NDArray[np.int64]:
         """(r,) index of the iteration, from 0."""
-        return self["iteration"]
+        return self.evaluations.iteration
 
     @property
     def particle(self) -> NDArray[np.int64]:
         """(r,) number of the design in its iteration, from 0."""
-        return self["particle"]
+        return self.evaluations.particle
 
     @property
     def fitness(self) -> Floats:
@@ -160,32 +154,66 @@ class EvaluationTable(Table):
     @property
     def designs(self) -> Floats:
         """(r, v) values of the variables, in their units; of categorical ones the indices."""
-        return np.stack([self._numbers(variable) for variable in self._known], axis=1)
+        return self.evaluations.designs
 
     @property
     def objectives(self) -> Floats:
         """(r, K, m) raw objectives, to be minimized, in their units; NaN where there is none."""
-        names = [f"{case}.{name}" for case in self.cases for name in self.objective_names]
-        return self._stacked(names).reshape(len(self), len(self.cases), len(self.objective_names))
+        return _finite(self.evaluations.objectives)
 
     @property
     def utilities(self) -> Floats:
         """(r, K) utilities, to be minimized; NaN where a design failed."""
-        return self._stacked([f"{case}.utility" for case in self.cases])
+        return np.stack([self[f"{case}.utility"] for case in self.cases], axis=1)
 
     @property
     def statuses(self) -> NDArray[np.str_]:
         """(r, K) statuses: `ok`, or the kind of failure."""
-        return np.stack([self[f"{case}.status"] for case in self.cases], axis=1)
+        return _LABELS[self.evaluations.statuses]
 
-    def _numbers(self, variable: Variable) -> Floats:
-        column = self[f"design.{variable.name}"]
+
+def joined(pieces: Sequence[EvaluationColumns]) -> EvaluationColumns:
+    """Concatenate evaluations."""
+    arrays = zip(*(piece.arrays for piece in pieces), strict=True)
+    return EvaluationColumns(*(np.concatenate(parts) for parts in arrays))
+
+
+def decoded_table(spec: Spec, content: bytes) -> EvaluationColumns:
+    """Read the Parquet file that `encoded_table` writes."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(pa.BufferReader(content))
+
+    def whole(name: str) -> NDArray[np.int64]:
+        column = table.column(name).to_numpy()
+        if column.dtype.kind != "i":
+            raise ValueError(f"{name} is not a column of integers")
+        return np.asarray(column, dtype=np.int64)
+
+    def numbers(name: str) -> Floats:
+        # Null becomes NaN.
+        return np.asarray(table.column(name).to_numpy(), dtype=np.float64)
+
+    def design(variable: Variable) -> Floats:
+        name = f"design.{variable.name}"
         if variable.kind != "categorical":
-            return column
-        return np.array([variable.number(name) for name in column.tolist()], dtype=np.float64)
+            return numbers(name)
+        return np.array([variable.number(c) for c in table.column(name).to_pylist()], np.float64)
 
-    def _stacked(self, names: list[str]) -> Floats:
-        return np.stack([self[name] for name in names], axis=1)
+    def statuses(case: str) -> list[Status]:
+        return [Status.from_label(label) for label in table.column(f"{case}.status").to_pylist()]
+
+    cases, fitness = spec.case_names, numbers("fitness")
+    objectives = [numbers(f"{case}.{o.name}") for case in cases for o in spec.objectives]
+    return EvaluationColumns(
+        iteration=whole("iteration"),
+        particle=whole("particle"),
+        designs=np.stack([design(variable) for variable in spec.design_space().columns], axis=1),
+        objectives=np.stack(objectives, axis=1).reshape(len(fitness), len(cases), -1),
+        statuses=np.stack([np.array(statuses(case), np.uint8) for case in cases], axis=1),
+        fitness=np.where(np.isnan(fitness), np.inf, fitness),
+    )
 
 
 def encoded_table(
@@ -211,7 +239,11 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
         "fitness": _finite(rows.fitness),
     }
     for variable, design in zip(spec.design_space().columns, rows.designs.T, strict=True):
-        columns[f"design.{variable.name}"] = _shown(variable, design)
+        columns[f"design.{variable.name}"] = (
+            np.array(variable.choices)[design.astype(np.intp)]
+            if variable.kind == "categorical"
+            else _finite(design)
+        )
     utilities = spec.judge(rows.objectives, rows.failed).utilities
     for k, case in enumerate(spec.case_names):
         columns[f"{case}.status"] = _LABELS[rows.statuses[:, k]]
@@ -219,13 +251,6 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
         for objective, values in zip(spec.objectives, rows.objectives[:, k].T, strict=True):
             columns[f"{case}.{objective.name}"] = _finite(values)
     return columns
-
-
-def _shown(variable: Variable, column: Floats) -> Column:
-    """Values of a variable; of a categorical one the names of choices."""
-    if variable.kind != "categorical":
-        return _finite(column)
-    return np.array(variable.choices)[column.astype(np.intp)]
 
 
 _LABELS: Final = np.array([status.label for status in sorted(Status)])
@@ -254,15 +279,6 @@ def _arrow(column: Column) -> pa.Array:
     if column.dtype.kind == "U":
         return pa.array(column.tolist(), type=pa.string())
     return pa.array(column, mask=np.isnan(column) if column.dtype.kind == "f" else None)
-
-
-def _numpy(column: pa.ChunkedArray) -> Column:
-    import pyarrow as pa
-
-    if pa.types.is_string(column.type):
-        return np.array(column.to_pylist(), dtype=np.str_)
-    # Null becomes NaN.
-    return np.asarray(column.to_numpy())
 
 
 def _csv(schema: pa.Schema, batches: Iterable[pa.RecordBatch]) -> Iterator[bytes]:

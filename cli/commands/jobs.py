@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.specs import ForkOptions
-    from gaitswarm.views.history import HistoryIterationView
-    from gaitswarm.views.job import JobSummaryView, JobView
+    from gaitswarm.views.job import HistoryIterationView, JobSummaryView, JobView
 
 
 def submit(

@@ -52,7 +52,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 from gaitswarm.tables import encoded_table
-from gaitswarm.views.history import BestView, IterationView
+from gaitswarm.views.job import BestView, IterationView
 
 WORST: Final = 20
 """Worst worlds in the summary of a certificate."""

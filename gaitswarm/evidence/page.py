@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.settings import place_of
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.surface import SurfaceRequest, run_surface
-from gaitswarm.views.history import BestView, IterationView
+from gaitswarm.views.job import BestView, IterationView
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,8 +21,11 @@ from gaitswarm.evidence.archive import (
     CHAIN,
     JOB,
     SUMMARY,
+    Evidence,
     check_hashes,
+    check_robots,
     parsed_json,
+    read_evidence,
 )
 from gaitswarm.evidence.contents import (
     WORST,
@@ -33,7 +36,6 @@ from gaitswarm.evidence.contents import (
     kernels_of,
     row_of,
 )
-from gaitswarm.evidence.reading import Evidence, check_robots, read_evidence
 from gaitswarm.services.optimizer.analysis.certificate import certificate as certificate_view
 from gaitswarm.services.optimizer.analysis.fork import retraced
 from gaitswarm.services.optimizer.analysis.verification import (
@@ -62,7 +64,8 @@ from gaitswarm.sim.mujoco.engines import ENGINE
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.simulation import evaluated
-from gaitswarm.views.history import BestView
+from gaitswarm.tables import joined
+from gaitswarm.views.job import BestView
 from gaitswarm.views.verification import (
     DIGEST,
     CheckView,
@@ -216,9 +219,8 @@ def _replay_stored(
         pieces.append(columns.rows(rows[at == iteration] - begins[iteration]))
         if spec.precision != "double" and best is not None and iteration == best[0]:
             again = in_double(columns, store.reevaluations(job.id, iteration, iteration + 1))
-    arrays = zip(*(piece.arrays for piece in pieces), strict=True)
-    columns = EvaluationColumns(*(np.concatenate(parts) for parts in arrays))
-    return report.replay(spec, columns, None if best is None else (best, again), recordings)
+    chosen = None if best is None else (best, again)
+    return report.replay(spec, joined(pieces), chosen, recordings)
 
 
 def verify(

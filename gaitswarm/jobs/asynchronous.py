@@ -14,8 +14,7 @@ from anyio import from_thread, to_thread
 from anyio.lowlevel import checkpoint
 
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop
-from gaitswarm.views.history import IterationView
-from gaitswarm.views.job import JobView
+from gaitswarm.views.job import IterationView, JobView
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.database import DatabaseJobs

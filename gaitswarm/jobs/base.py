@@ -131,8 +131,16 @@ from gaitswarm.specs import (
 from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, encoded_table
 from gaitswarm.views.catalogue import CatalogueView
-from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
-from gaitswarm.views.job import EstimateView, JobKind, JobSummaryView, JobView, StateView
+from gaitswarm.views.job import (
+    BestView,
+    EstimateView,
+    HistoryIterationView,
+    IterationView,
+    JobKind,
+    JobSummaryView,
+    JobView,
+    StateView,
+)
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import unzipped, zipped

@@ -24,8 +24,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.specs import SpecInput, chosen_spec
 from gaitswarm.tables import EvaluationTable
-from gaitswarm.views.history import HistoryIterationView, IterationView
-from gaitswarm.views.job import JobView, StateView
+from gaitswarm.views.job import HistoryIterationView, IterationView, JobView, StateView
 
 if TYPE_CHECKING:
     from gaitswarm.services.runtime import EvaluatorKind

@@ -23,8 +23,7 @@ from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.views.base import PREFIX
-from gaitswarm.views.history import IterationView
-from gaitswarm.views.job import JobView, StateView
+from gaitswarm.views.job import IterationView, JobView, StateView
 
 T = TypeVar("T")
 

@@ -1,21 +1,27 @@
-"""Jobs and their progress, and what a job would cost."""
+"""Jobs, their iterations and designs, and what a job would cost."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import ConfigDict, Field
 
-from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
+from gaitswarm.services.optimizer.analysis.evaluations import (
+    EvaluationView,
+    ObjectiveView,
+    evaluation_views,
+)
 from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.job import (
+    DELETABLE,
+    TRANSITIONS,
     Job,
     JobState,
     UnreadableSpec,
@@ -23,10 +29,88 @@ from gaitswarm.services.optimizer.jobs.job import (
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
-from gaitswarm.services.optimizer.views import Finite, JobName, View
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, JobName, View
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.views.base import job_links
-from gaitswarm.views.history import BestView
+from gaitswarm.views.base import PREFIX
+
+
+class SearchView(View):
+    """Fitness in single precision of a design that is judged in double."""
+
+    precision: Precision = Field(description="Of the search.", examples=["single"])
+    fitness: float = Field(
+        description="Of the design in that precision; units as of `fitness`.", examples=[20.8712]
+    )
+    difference: float = Field(
+        description="By how much that is more than in double precision, relative [1].",
+        examples=[0.00006],
+    )
+
+
+class BestView(EvaluationView):
+    """The best design that a job has found so far, always judged in double precision."""
+
+    fitness: float = Field(description="As of any evaluation; never null.", examples=[20.87])
+    search: SearchView | None = Field(
+        default=None, description="Fitness that a search in single precision was given."
+    )
+
+    @classmethod
+    def from_evaluation(cls, evaluation: Evaluation, spec: Spec) -> BestView:
+        """Make a view of a design that did not fail, by its reevaluation if there is one."""
+        search, reevaluation = None, evaluation.reevaluation
+        if reevaluation is not None:
+            found = evaluation.fitness
+            search = SearchView(
+                precision=spec.precision,
+                fitness=found,
+                difference=found / reevaluation.fitness - 1.0 if reevaluation.fitness else 0.0,
+            )
+            evaluation = replace(
+                evaluation,
+                objectives=reevaluation.objectives,
+                statuses=reevaluation.statuses,
+                fitness=reevaluation.fitness,
+            )
+        (view,) = evaluation_views([evaluation], spec)
+        return cls.model_validate({**dict(view), "search": search})
+
+
+class IterationView(View):
+    """Summary of one committed iteration. Fitness is minimized; null if every design failed."""
+
+    index: IterationIndex
+    designs: int = Field(description="Designs of the iteration [1].", examples=[25])
+    best: Finite = Field(description="Least fitness of this iteration [1].", examples=[21.3])
+    mean: Finite = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
+    median: Finite = Field(description="Median of them [1].", examples=[23.9])
+    worst: Finite = Field(description="Greatest of them [1].", examples=[41.7])
+    best_so_far: Finite = Field(
+        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
+    )
+    failed: int = Field(description="Designs that failed in some scenario [1].", examples=[2])
+    evaluate_seconds: float = Field(description="Time of its evaluation [s].", examples=[1.23])
+    committed_at: datetime = Field(description="When it was committed, UTC.")
+    digest: str | None = Field(
+        default=None,
+        description="SHA-256 of it, the spec and all iterations before it.",
+        examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
+    )
+
+
+class HistoryIterationView(IterationView):
+    """One committed iteration with every design."""
+
+    evaluations: list[EvaluationView] = Field(description="Every design, in order.")
+
+    @classmethod
+    def from_iteration_and_evaluations(
+        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
+    ) -> HistoryIterationView:
+        """Make a view of an iteration with its designs."""
+        particles = evaluation_views(evaluations, spec)
+        return cls.model_validate({**asdict(iteration), "evaluations": particles})
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,7 +426,7 @@ def _summary(job: Job) -> dict[str, object]:
         "eta_basis": rates.basis,
         "note": job.labels.note,
         "tags": job.labels.tags,
-        "links": job_links(job),
+        "links": _links(job),
     }
 
 
@@ -355,3 +439,44 @@ class JobFacetsView(View):
     controllers: dict[str, int] = Field(description="By motor controller [1].")
     preferences: dict[str, int] = Field(description="By preference, `own` for any other [1].")
     tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])
+
+
+_RESOURCES: Final = ("iterations", "events")
+_OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
+
+_RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
+"""Links of jobs whose spec can be read."""
+
+_COMMANDS: Final = {
+    state: [(c.value, after) for (before, c), after in TRANSITIONS.items() if before is state]
+    for state in JobState
+}
+"""Commands by state, each with the state after it."""
+
+
+def _links(job: Job) -> dict[str, str]:
+    """Return the links of a job."""
+    here = f"{PREFIX}/jobs/{job.id}"
+    names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
+    if isinstance(job.stored_spec, JobSpec):
+        names += ["ranking", *(_OF_A_BEST if job.progress.best_fitness is not None else ())]
+    resources = {name: f"{here}/{name}" for name in names}
+    commands = {
+        command: f"{here}/{command}"
+        for command, after in _COMMANDS[job.state]
+        if job.readable or after is not JobState.QUEUED
+    }
+    if job.readable and job.state is not JobState.CANCELLED:
+        commands["extend"] = f"{here}/extend"
+    if job.readable and job.progress.iterations:
+        resources["evidence"] = f"{here}/evidence"
+        resources["verify"] = f"{here}/verify"
+        commands["fork"] = f"{here}/fork"
+    commands["keep"] = f"{here}/keep"
+    if not job.state.terminal:
+        commands["priority"] = f"{here}/priority"
+    if job.state in DELETABLE and not job.kept:
+        commands["delete"] = here
+    if job.lineage is not None:
+        resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"
+    return {"self": here, **resources, **commands}

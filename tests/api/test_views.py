@@ -18,8 +18,7 @@ from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
 from gaitswarm.simulation import SimulationView, WalkLogView
-from gaitswarm.views.history import BestView, HistoryIterationView
-from gaitswarm.views.job import JobView
+from gaitswarm.views.job import BestView, HistoryIterationView, JobView
 from tests.api.conftest import Commit
 
 

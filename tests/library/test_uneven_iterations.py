@@ -11,8 +11,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm.services.runtime import open_store
-from gaitswarm.views.history import IterationView
-from gaitswarm.views.job import Spent, budget_spent
+from gaitswarm.views.job import IterationView, Spent, budget_spent
 from tests.examples.jobs import history
 from tests.examples.uneven import SIZES, run_uneven, uneven_iterations
 from tests.library.conftest import Reach

@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from functools import partial
-from queue import SimpleQueue
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
@@ -16,6 +14,9 @@ from gaitswarm.services.worker.dispatch import Dispatcher, Load, build_kernels
 from gaitswarm.services.worker.tasks import Answer, TaskTotals, run_task
 from gaitswarm.sim.outcome import Outcome
 
+_Task = tuple[Future[Answer], threading.Event]
+"""A task, and whether its answer is not needed any more."""
+
 
 def available_cpus() -> int:
     """Processors that this process may use."""
@@ -23,7 +24,7 @@ def available_cpus() -> int:
 
 
 class InProcessEvaluator:
-    """`Evaluator` on threads.
+    """`Evaluator` on threads, and the `Engine` of its tasks.
 
     Args:
         cpus: Number of threads; all processors by default.
@@ -33,16 +34,12 @@ class InProcessEvaluator:
     """
 
     def __init__(self, cpus: int | None = None) -> None:
-        slots = cpus if cpus is not None else available_cpus()
-        if slots < 1:
-            raise ValueError(f"cpus must be at least 1, it is {slots}")
+        self.slots = cpus if cpus is not None else available_cpus()
+        if self.slots < 1:
+            raise ValueError(f"cpus must be at least 1, it is {self.slots}")
         self._dispatcher = Dispatcher()
-        self._threads = _Threads(slots)
-
-    @property
-    def slots(self) -> int:
-        """Number of threads."""
-        return self._threads.slots
+        self._pool = ThreadPoolExecutor(self.slots, thread_name_prefix="walks")
+        self._closed = threading.Event()
 
     @property
     def place(self) -> str:
@@ -64,81 +61,50 @@ class InProcessEvaluator:
     ) -> tuple[Outcome, ...]:
         """Simulate in the threads, once the robots' kernels are built."""
         build_kernels(request.cases, should_stop)
-        return self._dispatcher.evaluate(self._threads, request, should_stop)
+        return self._dispatcher.evaluate(self, request, should_stop)
 
     def close(self) -> None:
         """End the threads after their present chunks. Idempotent."""
-        self._threads.close()
-
-
-class _Task(Future[Answer]):
-    """A task in the queue."""
-
-    def __init__(self, request: EvaluationRequest, chunk: Chunk) -> None:
-        super().__init__()
-        self.request, self.chunk, self.abandoned = request, chunk, False
-
-    def run(self, should_stop: Callable[[], bool]) -> None:
-        request, chunk = self.request, self.chunk
-        try:
-            answer = run_task(
-                [request.cases[case] for case in chunk.cases],
-                request.designs[chunk.start : chunk.stop],
-                request.provenance,
-                should_stop,
-            )
-        except Exception as error:  # noqa: BLE001 - raised again in `answer`
-            self.set_exception(error)
-        else:
-            self.set_result(answer)
-
-
-class _Threads:
-    """`Engine` of this process."""
-
-    def __init__(self, slots: int) -> None:
-        self.slots = slots
-        self._closed = False
-        self._queue: SimpleQueue[_Task | None] = SimpleQueue()
-        self._threads = [
-            threading.Thread(target=self._work, name=f"walks-{k}", daemon=True)
-            for k in range(slots)
-        ]
-        for thread in self._threads:
-            thread.start()
+        self._closed.set()
+        self._pool.shutdown()
 
     def submit(self, request: EvaluationRequest, chunk: Chunk, _attempts: int, /) -> _Task:
-        task = _Task(request, chunk)
-        self._queue.put(task)
-        return task
+        """Queue a task for the threads."""
+        abandoned = threading.Event()
+
+        def in_vain() -> bool:
+            return abandoned.is_set() or self._closed.is_set()
+
+        def run() -> Answer:
+            self.check()
+            cases = [request.cases[case] for case in chunk.cases]
+            designs = request.designs[chunk.start : chunk.stop]
+            return run_task(cases, designs, request.provenance, in_vain)
+
+        try:
+            return self._pool.submit(run), abandoned
+        except RuntimeError:
+            # Closed meanwhile.
+            self.check()
+            raise
 
     def wait(self, handles: Sequence[_Task], seconds: float) -> Sequence[_Task]:
-        done = wait(handles, timeout=seconds, return_when=FIRST_COMPLETED).done
-        return [task for task in handles if task in done]
+        """Return the finished tasks; wait for one up to a time [s]."""
+        futures = [future for future, _ in handles]
+        done = wait(futures, timeout=seconds, return_when=FIRST_COMPLETED).done
+        return [handle for handle in handles if handle[0] in done]
 
     def answer(self, handle: _Task) -> Answer:
-        return handle.result()
+        """Return the answer of a finished task, or raise its error."""
+        return handle[0].result()
 
     def abandon(self, handles: Sequence[_Task]) -> None:
-        for task in handles:
-            task.abandoned = True
-            task.cancel()
+        """Drop tasks that have not begun, and let the others end soon."""
+        for future, abandoned in handles:
+            abandoned.set()
+            future.cancel()
 
     def check(self) -> None:
-        if self._closed:
+        """Raise EvaluatorUnavailable once closed."""
+        if self._closed.is_set():
             raise EvaluatorUnavailable("the evaluator was closed")
-
-    def close(self) -> None:
-        self._closed = True
-        for _ in self._threads:
-            self._queue.put(None)
-        for thread in self._threads:
-            thread.join()
-
-    def _work(self) -> None:
-        while (task := self._queue.get()) is not None:
-            if not self._closed and task.set_running_or_notify_cancel():
-                task.run(partial(self._in_vain, task))
-
-    def _in_vain(self, task: _Task) -> bool:
-        return task.abandoned or self._closed

@@ -24,7 +24,7 @@ from gaitswarm.services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -115,7 +115,7 @@ def run_claim(
 
     Unreachable workers or an unavailable store are waited for as long as the lease holds.
     """
-    run = _Run.of(claim, context, stop or threading.Event(), drain or threading.Event())
+    run = _Run(claim, context, stop or threading.Event(), drain or threading.Event())
     try:
         with log_context(job=claim.job.id), run.heartbeat:
             state, actions = run.begin()
@@ -136,43 +136,30 @@ def _fail(state: Coordination, error: Exception, what: str) -> Decision:
     return replace(state, phase=Phase.ENDED), (failed,)
 
 
-@dataclass(slots=True)
 class _Run:
-    """claim: that of the heartbeat, with the job as last read.
-
-    worker_outage, store_outage: outages of the evaluator and of the store.
-    """
-
-    claim: Claim
-    context: RunContext
-    heartbeat: Heartbeat
-    journal: Journal
-    stop: threading.Event
-    drain: threading.Event
-    worker_outage: Outage
-    store_outage: Outage
-
-    @classmethod
-    def of(
-        cls, claim: Claim, context: RunContext, stop: threading.Event, drain: threading.Event
-    ) -> _Run:
-        worker_outage, store_outage = Outage(context.clock), Outage(context.clock)
-        journal = Journal(
+    def __init__(
+        self, claim: Claim, context: RunContext, stop: threading.Event, drain: threading.Event
+    ) -> None:
+        self.claim = claim  # that of the heartbeat, with the job as last read
+        self.context = context
+        self.stop = stop
+        self.drain = drain
+        self.worker_outage, self.store_outage = Outage(context.clock), Outage(context.clock)
+        self.journal = Journal(
             claim,
             context.store,
             context.evaluator,
             after_seconds=context.journal_seconds,
             clock=context.clock,
         )
-        heartbeat = Heartbeat(
+        self.heartbeat = Heartbeat(
             context.store,
             claim,
             lease_seconds=context.lease_seconds,
-            waiting=lambda: worker_outage.reason,
-            outage=store_outage,
-            after_beat=journal.store_finished,
+            waiting=lambda: self.worker_outage.reason,
+            outage=self.store_outage,
+            after_beat=self.journal.store_finished,
         )
-        return cls(claim, context, heartbeat, journal, stop, drain, worker_outage, store_outage)
 
     def begin(self) -> Decision:
         """Decide on the first actions; a job whose robot cannot be read fails."""
@@ -196,29 +183,28 @@ class _Run:
 
     def execute(self, actions: tuple[Action, ...]) -> Event:
         """Execute actions in order; return the event that answers the last, or an interruption."""
-        try:
-            return self._do_all(actions)
-        except LeaseLost:
-            return LeaseWasLost()
-        except EvaluationStopped:
-            return self._stopped()
-
-    def _stopped(self) -> Event:
-        return LeaseWasLost() if self.heartbeat.lost else StopRequested()
-
-    def _do_all(self, actions: tuple[Action, ...]) -> Event:
         answer: Event | None = None
         try:
             for action in actions:
                 with log_context(iteration=iteration_of(action)):
                     answer = self._do(action)
+        except LeaseLost:
+            return LeaseWasLost()
+        except EvaluationStopped:
+            return self._stopped()
         except BudgetChanged:
-            job = self._stored(lambda: self.context.store.job(self.claim.job.id))
+            try:
+                job = self._stored(lambda: self.context.store.job(self.claim.job.id))
+            except EvaluationStopped:
+                return self._stopped()
             self.claim = replace(self.claim, job=job)
             return Extended(job)
         if answer is None:
             raise AssertionError("the last of the coordinator's actions has no answer")
         return answer
+
+    def _stopped(self) -> Event:
+        return LeaseWasLost() if self.heartbeat.lost else StopRequested()
 
     def _do(self, action: Action) -> Event | None:
         match action:
@@ -232,7 +218,11 @@ class _Run:
                 return self._evaluate(request, keys)
             case Commit(done=done, following=following):
                 done = replace(done, evaluated_on=place_of(self.context.evaluator))
-                state = self._commit(done, following)
+                journaled, commit = self.journal.close(), self.context.store.commit
+                state = self._stored(
+                    lambda: commit(self.claim, done, following, journaled=journaled)
+                )
+                self.journal.clear()
                 if self.context.on_commit is not None:
                     self.context.on_commit(done, state)
                 if state is JobState.RUNNING and self.drain.is_set():
@@ -243,14 +233,6 @@ class _Run:
             case Release(state=state, error=error):
                 self._stored(lambda: self.context.store.release(self.claim, state, error=error))
                 return LeaseWasLost()
-
-    def _commit(self, done: CompletedIteration, following: Ask | None) -> JobState:
-        journaled = self.journal.close()
-        state = self._stored(
-            lambda: self.context.store.commit(self.claim, done, following, journaled=journaled)
-        )
-        self.journal.clear()
-        return state
 
     def _evaluate(self, request: EvaluationRequest, keys: tuple[bytes, ...]) -> Event:
         if self._should_stop():
@@ -290,46 +272,46 @@ class _Run:
         return Waited()
 
     def _stored(self, access: Callable[[], T]) -> T:
-        """Access the store, retrying indefinitely: an evaluated iteration is expensive.
+        """Access the store, retrying indefinitely: an evaluated iteration is expensive."""
+        answer = self._retried(access, self.store_outage, _STORE)
+        self._note_success(self.store_outage)
+        return answer
 
-        Raises EvaluationStopped if the process is to end or the lease is lost, and StoreReplaced,
-        which retries cannot resolve.
+    def _computed(self, compute: Callable[[], T]) -> T:
+        """Compute, retrying while the machine lacks resources, unless the job is to pause."""
+        return self._retried(
+            compute,
+            self.worker_outage,
+            self.context.backoff,
+            give_up=lambda: self.heartbeat.state is JobState.PAUSING or self.drain.is_set(),
+        )
+
+    def _retried(
+        self,
+        access: Callable[[], T],
+        outage: Outage,
+        backoff: Backoff,
+        *,
+        give_up: Callable[[], bool] = lambda: False,
+    ) -> T:
+        """Retry as long as the machine or its services are at fault.
+
+        Raises EvaluationStopped if the process is to end, the lease is lost or `give_up` is true
+        meanwhile, and StoreReplaced, which retries cannot resolve.
         """
         failures = 0
         while True:
             try:
-                answer = access()
+                return access()
             except StoreReplaced:
                 raise
             except Exception as error:
                 if not is_infrastructure(error):
                     raise
-                self._note_failure(self.store_outage, _in_words(error))
-            else:
-                self._note_success(self.store_outage)
-                return answer
+                self._note_failure(outage, _in_words(error))
             failures += 1
-            for _ in self._ticks(_STORE.pause(failures)):
-                pass
-
-    def _computed(self, compute: Callable[[], T]) -> T:
-        """Compute, retrying while the machine lacks resources.
-
-        Raises EvaluationStopped as `_stored`, and when the job is to pause.
-        """
-        failures = 0
-        while True:
-            try:
-                answer = compute()
-            except Exception as error:
-                if not is_infrastructure(error):
-                    raise
-                self._note_failure(self.worker_outage, _in_words(error))
-            else:
-                return answer
-            failures += 1
-            for _ in self._ticks(self.context.backoff.pause(failures)):
-                if self.heartbeat.state is JobState.PAUSING or self.drain.is_set():
+            for _ in self._ticks(backoff.pause(failures)):
+                if give_up():
                     raise EvaluationStopped
 
     def _note_failure(self, outage: Outage, reason: str) -> None:

@@ -188,22 +188,20 @@ class Runner:
         self._drain.wait(_PAUSES.pause(self._outage.failures))
 
     def _run(self, claim: Claim) -> None:
-        with log_context(job=claim.job.id):
-            self._run_job(claim)
-
-    def _run_job(self, claim: Claim) -> None:
         # The job stays as last committed; the next claim continues from there.
-        try:
-            job = run_claim(claim, self._context, self._stop, self._drain)
-            _log.info("job %s: %s after %d iterations", job.id, job.state, job.progress.iterations)
-            if self._on_ended is not None and not self._stop.is_set():
-                self._on_ended(job)
-        except NotFound as error:
-            _log.info("job %s was deleted: %s", claim.job.id, error)
-        except Exception as error:  # noqa: BLE001
-            if is_infrastructure(error):
-                _log.warning("job %s: interrupted: %s", claim.job.id, error)
-            else:
-                _log.exception("job %s: interrupted", claim.job.id)
-        finally:
-            self._room.release()
+        with log_context(job=claim.job.id):
+            try:
+                job = run_claim(claim, self._context, self._stop, self._drain)
+                iterations = job.progress.iterations
+                _log.info("job %s: %s after %d iterations", job.id, job.state, iterations)
+                if self._on_ended is not None and not self._stop.is_set():
+                    self._on_ended(job)
+            except NotFound as error:
+                _log.info("job %s was deleted: %s", claim.job.id, error)
+            except Exception as error:  # noqa: BLE001
+                if is_infrastructure(error):
+                    _log.warning("job %s: interrupted: %s", claim.job.id, error)
+                else:
+                    _log.exception("job %s: interrupted", claim.job.id)
+            finally:
+                self._room.release()

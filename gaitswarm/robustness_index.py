@@ -98,17 +98,13 @@ class RobustnessRequest(WalksRequest):
 
     def sample(self) -> LocalSample:
         """Sample designs around the given one."""
-        try:
-            return local_sample(
-                self.numbers,
-                tuple(self._resolved_variables()),
-                radius=self.radius,
-                samples=self.samples,
-                seed=self.seed,
-            )
-        except ValueError as error:
-            field, _, message = str(error).partition(": ")
-            raise InvalidRequest(message, field=field) from error
+        return local_sample(
+            self.numbers,
+            tuple(self._resolved_variables()),
+            radius=self.radius,
+            samples=self.samples,
+            seed=self.seed,
+        )
 
     def _resolved_variables(self) -> Iterator[Variable]:
         catalogue = design_catalogue(self.controller)
@@ -116,38 +112,28 @@ class RobustnessRequest(WalksRequest):
         seen = set[str]()
         for index, entry in enumerate(own if self.variables is None else self.variables):
             name = entry if isinstance(entry, str) else entry.name
+            field = f"variables.{index}"
             if name in seen:
-                raise ValueError(f"variables.{index}: {name!r} is named twice")
+                raise InvalidRequest(f"{name!r} is named twice", field=field)
             seen.add(name)
             if name not in catalogue:
-                raise ValueError(
-                    f"variables.{index}: unknown variable {name!r}; {instead_of(name, catalogue)}"
-                )
+                known = instead_of(name, catalogue)
+                raise InvalidRequest(f"unknown variable {name!r}; {known}", field=field)
             if name not in self.design:
-                raise ValueError(f"variables.{index}: the design gives no {name}")
+                raise InvalidRequest(f"the design gives no {name}", field=field)
             yield catalogue[name] if isinstance(entry, str) else entry
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalSample:
-    """Designs uniform in a box around a design, within the variables' bounds.
+    """Designs uniform in a box around a design, within the variables' bounds."""
 
-    Attributes:
-        varied: the d varied variables.
-        held: names of fixed variables: categorical ones, and integers whose neighbors are outside
-            the box.
-        names: v columns of the designs.
-        designs: (1 + n, v), the center first.
-        shift: (1 + n, d) distance from the center, as a share of each variable's bounds.
-        radius: half the box's width, as a share of the bounds.
-    """
-
-    varied: tuple[Variable, ...]
-    held: tuple[str, ...]
-    names: tuple[str, ...]
-    designs: Floats
-    shift: Floats
-    radius: float
+    varied: tuple[Variable, ...]  # d
+    held: tuple[str, ...]  # categorical ones, and integers whose neighbors are outside the box
+    names: tuple[str, ...]  # v columns of the designs
+    designs: Floats  # (1 + n, v), the center first
+    shift: Floats  # (1 + n, d) from the center, as a share of each variable's bounds
+    radius: float  # half the box's width, as a share of the bounds
 
 
 ByVariable = Annotated[dict[str, Finite], Field(examples=[{"FI1R": 0.7, "FOR": 0.8}])]
@@ -392,11 +378,12 @@ def local_sample(
     """
     varied = tuple(v for v in variables if _reaches_neighbours(v, radius))
     if not varied:
-        raise ValueError("variables: none of them can vary; choose others or a greater radius")
-    if samples < least_samples(len(varied)):
-        raise ValueError(
-            f"samples: {len(varied)} variables require at least {least_samples(len(varied))}"
+        raise InvalidRequest(
+            "none of them can vary; choose others or a greater radius", field="variables"
         )
+    least = least_samples(len(varied))
+    if samples < least:
+        raise InvalidRequest(f"{len(varied)} variables require at least {least}", field="samples")
     names = tuple(design)
     designs = np.tile(np.array(list(design.values()), dtype=np.float64), (1 + samples, 1))
     shift = np.zeros((1 + samples, len(varied)))
@@ -429,14 +416,10 @@ def _around(center: float, variable: Variable, radius: float, numbers: Floats) -
 
 
 class _Norm(NamedTuple):
-    """Squared norm of a Jacobian.
+    """Squared norm of a Jacobian."""
 
-    biased: of the sample's regression; unbiased: (1 + B,) less the contribution of noise, of the
-    sample and of each resample.
-    """
-
-    biased: float
-    unbiased: Floats
+    biased: float  # of the sample's regression
+    unbiased: Floats  # (1 + B,) less the contribution of noise, of the sample and of each resample
 
     def interval(self) -> IndexView:
         """Interval of the norm. For a resample the sample's biased norm is the true one."""
@@ -519,11 +502,9 @@ def _named(names: Iterable[str], values: Iterable[T]) -> dict[str, T]:
 
 
 class _Regressions(NamedTuple):
-    """slopes and their variances: (1 + B, d, M); residual: (1 + B, M) standard deviation."""
-
-    slopes: Floats
-    variances: Floats
-    residual: Floats
+    slopes: Floats  # (1 + B, d, M)
+    variances: Floats  # of the slopes, (1 + B, d, M)
+    residual: Floats  # standard deviation, (1 + B, M)
 
 
 def _regressions(x: Floats, y: Floats, weights: Floats) -> _Regressions:

@@ -42,17 +42,18 @@ def _network(text: str) -> str:
     return str(ip_network(text, strict=False)) if "/" in text else str(ip_address(text))
 
 
-def _paths(value: object) -> object:
-    """Split a list with colons."""
-    return [part for part in value.split(os.pathsep) if part] if isinstance(value, str) else value
-
-
 Network = Annotated[str, AfterValidator(_network)]
 
 
-def _parts(value: object) -> object:
-    """Split a list with commas."""
-    return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+def _separated(by: str) -> BeforeValidator:
+    """Split a text into a list without empty parts."""
+
+    def split(value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        return [part.strip() for part in value.split(by) if part.strip()]
+
+    return BeforeValidator(split)
 
 
 class Settings(BaseModel):
@@ -124,12 +125,12 @@ class Settings(BaseModel):
         le=1000,
         description="Runner processes in a row that may die with a job before it fails.",
     )
-    robots: Annotated[tuple[Path, ...], BeforeValidator(_paths)] = Field(
+    robots: Annotated[tuple[Path, ...], _separated(os.pathsep)] = Field(
         default=(),
         description="Folders of robots, or of such folders, separated by `:`, whose meshes a server"
         " serves to clients that may read its jobs.",
     )
-    webhook_hosts: Annotated[tuple[HostName, ...], BeforeValidator(_parts)] = Field(
+    webhook_hosts: Annotated[tuple[HostName, ...], _separated(",")] = Field(
         default=(),
         description="Hosts, with or without port and separated by commas, that may be notified of"
         " ended jobs; none: no notifications.",
@@ -183,7 +184,7 @@ class Settings(BaseModel):
         description="`auto`: requests need a token where the server listens beyond its own machine;"
         " `token`: always.",
     )
-    api_allowed_hosts: Annotated[tuple[HostName, ...], BeforeValidator(_parts)] = Field(
+    api_allowed_hosts: Annotated[tuple[HostName, ...], _separated(",")] = Field(
         default=(),
         description="Host names, with or without port and separated by commas, of the server, or"
         " a runner's metrics port, besides its addresses, `localhost`, its host and"
@@ -258,7 +259,7 @@ class Settings(BaseModel):
     api_idle_seconds: int = Field(
         default=15, ge=1, description="Idle time after which a connection is closed [s]."
     )
-    api_trusted_proxies: Annotated[tuple[Network, ...], BeforeValidator(_parts)] = Field(
+    api_trusted_proxies: Annotated[tuple[Network, ...], _separated(",")] = Field(
         default=("127.0.0.1", "::1"),
         description="Addresses or networks, separated by commas, of proxies trusted to state"
         " the client's address and scheme.",

@@ -13,8 +13,7 @@ from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.progress import Progress, show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, worth
 from gaitswarm.designs import SimulationRequest
-from gaitswarm.jobs.database import DatabaseJobs
-from gaitswarm.jobs.embedded import check_same, earlier_job, taken_up
+from gaitswarm.jobs.database import DatabaseJobs, check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import JobState

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.errors import JobEnded
 from gaitswarm.jobs.base import Jobs
-from gaitswarm.jobs.embedded import check_same, check_workers
+from gaitswarm.jobs.database import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.robustness_index import Progress, sampled_indices
 from gaitswarm.services.optimizer.analysis.preferences import (
@@ -25,6 +25,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 )
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.sim.kernel.walk import Precision
@@ -153,17 +154,15 @@ def optimize(
     """
     if accept_changes and resume is None:
         raise InvalidRequest("a new job has no changes to accept", field="accept_changes")
-    asked = None
-    if resume is None or spec is not None or options:
-        asked = job_spec(spec, **options)
+    begun: str | Spec = resume or job_spec(spec, **options)
+    again = job_spec(spec, **options) if resume and (spec is not None or options) else None
     check_workers(evaluator, cpus)
     with open_database(db, create=resume is None) as jobs:
-        if asked is not None and resume is not None:
-            check_same(jobs.job(resume).spec, asked, resume)
-        elif asked is not None and reuse:
-            resume = jobs.earlier(asked)
+        if again is not None and resume is not None:
+            check_same(jobs.job(resume).spec, again, resume)
         job = jobs.run(
-            resume or jobs.submit_embedded(asked),
+            begun,
+            reuse=reuse,
             evaluator=evaluator,
             cpus=cpus,
             ray_address=ray_address,

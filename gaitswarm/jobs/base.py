@@ -1181,7 +1181,7 @@ class Jobs(ABC):
         from gaitswarm.evidence.verify import run_verification
 
         request = VerificationRequest(replay=replay, seed=seed, head=head)
-        check = self._context.limits.check_repeated
+        check = partial(self._context.limits.check_sampled, field="replay")
         return run_verification(self._service, job_id, request, check=check)
 
     @robots(

@@ -3,31 +3,35 @@
 from __future__ import annotations
 
 import shlex
+import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from gaitswarm.errors import Interrupted, simulation_errors
 from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
-from gaitswarm.jobs.embedded import check_workers, ctrl_c, earlier_job, taken_up
 from gaitswarm.jobs.operation import Operation
 from gaitswarm.services.optimizer.analysis.reference import note_reference
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import default_database, read_settings
-from gaitswarm.specs import SpecInput, chosen_spec
 from gaitswarm.tables import EvaluationTable
 from gaitswarm.views.job import HistoryIterationView, IterationView, JobView, StateView
 
 if TYPE_CHECKING:
     from gaitswarm.services.runtime import EvaluatorKind
+
+_RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
+"""States from which a job continues only by a command."""
 
 POLL_SECONDS: Final = 0.5
 """Time between two readings of a followed job [s]."""
@@ -117,39 +121,11 @@ class DatabaseJobs(Jobs):
         firmware = run_firmware(request)
         return firmware_view(request, firmware), firmware.files
 
-    def submit_embedded(self, spec: SpecInput | None) -> Claim:
-        """Store a job that only this process is to run, so that no runner claims it before.
-
-        Args:
-            spec: As for `submit`.
-
-        Returns:
-            A claim on the job, which lasts some seconds: give it to `run` at once.
-
-        Raises:
-            InvalidRequest: The job is invalid or cannot be simulated; names the field.
-        """
-        chosen = chosen_spec(spec, {})
-        with simulation_errors("spec"):
-            return self._service.submit_embedded(chosen)
-
-    def earlier(self, spec: SpecInput) -> str | None:
-        """Find a job of the same name and specification that is still valid.
-
-        Args:
-            spec: As for `submit`.
-
-        Returns:
-            Identifier of a job that was not cancelled and whose provenance (code, robot and
-            libraries) is that of a new one; None if there is none.
-        """
-        job = earlier_job(self._service, chosen_spec(spec, {}))
-        return None if job is None else job.id
-
     def run(
         self,
-        job: str | Claim,
+        job: str | Spec,
         *,
+        reuse: bool = False,
         evaluator: EvaluatorKind | Evaluator = "auto",
         cpus: int | None = None,
         ray_address: str | None = None,
@@ -164,7 +140,10 @@ class DatabaseJobs(Jobs):
         to the queue, as does an exception of `on_iteration`, which is passed on.
 
         Args:
-            job: Identifier of the job; or the result of `submit_embedded`.
+            job: Identifier of the job; or the specification of a new one, which no other process
+                is to run.
+            reuse: Whether to take an earlier job in place of a new one: of the same name and
+                specification, not cancelled, and of the same provenance.
             evaluator: "in-process": threads of this process; "ray": Ray; "auto": Ray at
                 `ray_address`, else threads; or an open evaluator, which stays open.
             cpus: Simulations to run at once on this machine; default all processors.
@@ -179,6 +158,7 @@ class DatabaseJobs(Jobs):
             The job as it is then: ended, paused, or queued if it was stopped.
 
         Raises:
+            InvalidRequest: The new job cannot be simulated; names the field.
             Interrupted: Ctrl-C; says how to resume.
             Conflict: The job was cancelled.
             ProvenanceChanged: The provenance has changed, which is not accepted.
@@ -188,9 +168,13 @@ class DatabaseJobs(Jobs):
 
         check_workers(evaluator, cpus)
         stop = stop or threading.Event()
-        job_id = job if isinstance(job, str) else job.job.id
-        if isinstance(job, str):
-            taken_up(self._service, job, accept_changes=accept_changes)
+        if isinstance(job, Spec):
+            begun = self._begun(job, reuse=reuse)
+        else:
+            begun = job
+        job_id = begun if isinstance(begun, str) else begun.job.id
+        if isinstance(begun, str):
+            taken_up(self._service, begun, accept_changes=accept_changes)
 
         def committed(index: int) -> None:
             if on_iteration is not None:
@@ -212,7 +196,7 @@ class DatabaseJobs(Jobs):
                 ended = run_embedded(
                     self._service.store,
                     opened,
-                    job,
+                    begun,
                     on_commit=lambda done, _state: committed(done.iteration),
                     on_follow=lambda iteration: committed(iteration.index),
                     stop=stop,
@@ -226,6 +210,100 @@ class DatabaseJobs(Jobs):
             raise Interrupted(view, self._url)
         return view
 
+    def _begun(self, spec: Spec, *, reuse: bool) -> str | Claim:
+        """Store a new job, or return the id of an earlier one."""
+        earlier = earlier_job(self._service, spec) if reuse else None
+        if earlier is not None:
+            return earlier.id
+        with simulation_errors("spec"):
+            return self._service.submit_embedded(spec)
+
     def close(self) -> None:
         """Close the store."""
         self._service.store.close()
+
+
+def check_workers(evaluator: EvaluatorKind | Evaluator, cpus: int | None) -> None:
+    """Raise InvalidRequest for an unknown kind of workers, or less than one thread."""
+    from gaitswarm.services.runtime import EvaluatorKind
+
+    kinds = get_args(EvaluatorKind)
+    if isinstance(evaluator, str) and evaluator not in kinds:
+        raise InvalidRequest(f"{evaluator!r} is none of {', '.join(kinds)}", field="evaluator")
+    if cpus is not None and cpus < 1:
+        raise InvalidRequest("must be at least 1", field="cpus")
+
+
+def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
+    """Raise Conflict if a spec differs from that of the job to resume in more than the name."""
+    before, wanted = stored.model_dump(), asked.resolved().model_dump()
+    changed = [f for f in before if f != "name" and before[f] != wanted.get(f)]
+    if changed:
+        raise Conflict(
+            f"job {job_id} was submitted with another {', '.join(changed)}, which cannot change;"
+            " resume it without a spec and options, or start a new one"
+        )
+
+
+def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
+    """Resume a paused or failed job; return any other as it is.
+
+    Raises Conflict if it was cancelled, and ProvenanceChanged if that is not accepted.
+    """
+    job = service.job(job_id)
+    if job.state is JobState.CANCELLED:
+        raise Conflict(f"job {job_id} was cancelled, which is final; start a new one")
+    if job.state is not JobState.SUCCEEDED and not accept_changes:
+        service.check_unchanged(job)
+    return service.store.command(job_id, Command.RESUME) if job.state in _RESUMED else job
+
+
+def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) -> Job | None:
+    """Find a job of the same spec and name that was not cancelled and has today's provenance.
+
+    any_budget: whether its number of iterations may differ.
+    """
+    wanted = spec.resolved()
+    after: str | None = None
+    while True:
+        page = service.store.jobs(search=spec.name, after=after)
+        for job in page.items:
+            if not job.readable or job.state is JobState.CANCELLED:
+                continue
+            budget = wanted.iterations
+            if job.spec != wanted and not (
+                any_budget and job.spec.with_budget(budget) == wanted.with_budget(budget)
+            ):
+                continue
+            with suppress(ProvenanceChanged):
+                service.check_unchanged(job)
+                if len(job.provenance) <= 1:
+                    return job
+        if page.next is None:
+            return None
+        after = page.next
+
+
+@contextmanager
+def ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
+    """Yield an event that the first Ctrl-C sets, as it sets `stop`; the second one interrupts.
+
+    Nothing changes where Python's own handler is not in place, or outside the main thread.
+    """
+    pressed = threading.Event()
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield pressed
+        return
+
+    def handle(_number: int, _frame: Any) -> None:
+        if pressed.is_set():
+            raise KeyboardInterrupt
+        pressed.set()
+        stop.set()
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

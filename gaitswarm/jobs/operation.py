@@ -64,20 +64,12 @@ class Limits:
 
     def check(self, seconds: float, *, field: str, logged: bool = False) -> None:
         """Reject simulations that are too long in total."""
-        advice = f"allowed{' with logs' if logged else ''}; choose fewer scenarios or cycles"
-        limit = self.logged if logged else self.simulated
-        _check_length("the simulations", seconds, limit, advice, field)
+        limit, what = (self.logged, "allowed with logs") if logged else (self.simulated, "allowed")
+        _check_length(seconds, limit, f"{what}; choose fewer scenarios or cycles", field)
 
-    def check_sampled(self, seconds: float) -> None:
-        """Reject samples of designs whose simulations are too long in total."""
-        advice = "allowed; choose fewer samples or scenarios"
-        designs = "the simulations of all designs"
-        _check_length(designs, seconds, self.sampled, advice, "samples")
-
-    def check_repeated(self, seconds: float) -> None:
-        """Reject repeated evaluations whose simulations are too long in total."""
-        evaluations = "the simulations of these evaluations"
-        _check_length(evaluations, seconds, self.sampled, "allowed; choose fewer", "replay")
+    def check_sampled(self, seconds: float, field: str = "samples") -> None:
+        """Reject samples of designs or of evaluations whose simulations are too long in total."""
+        _check_length(seconds, self.sampled, "allowed; choose fewer", field)
 
     def check_ranked(self, preferences: int, job: Job) -> None:
         """Reject too many preferences for the evaluations of a job."""
@@ -90,9 +82,9 @@ class Limits:
             )
 
 
-def _check_length(what: str, seconds: float, limit: float, advice: str, field: str) -> None:
+def _check_length(seconds: float, limit: float, advice: str, field: str) -> None:
     if seconds > limit:
-        text = f"{what} last {seconds:g} s in total, more than the {limit:g} s {advice}"
+        text = f"the simulations last {seconds:g} s in total, more than the {limit:g} s {advice}"
         raise InvalidRequest(text, field=field)
 
 

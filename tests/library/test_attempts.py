@@ -16,8 +16,7 @@ import httpx2
 import pytest
 
 import gaitswarm
-from gaitswarm.jobs.attempts import Attempts, error_of
-from gaitswarm.jobs.server import authorities
+from gaitswarm.jobs.server import Attempts, authorities, error_of
 from tests.library.conftest import SMALL, Finished
 
 URL = "http://127.0.0.1:1"

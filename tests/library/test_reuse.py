@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from gaitswarm.jobs.embedded import earlier_job
+from gaitswarm.jobs.database import earlier_job
 from gaitswarm.services.optimizer.jobs.job import Command
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import open_store

@@ -10,7 +10,8 @@ import json
 import tempfile
 import threading
 import time
-from dataclasses import asdict, dataclass
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Final, get_args
 
@@ -18,14 +19,15 @@ from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store import Observer, open_store
+from gaitswarm.services.runtime import ObservedEvaluator
 from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
-from gaitswarm.services.worker.tasks import TaskTotals
 from gaitswarm.sim.assembly import kernel_of
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel.walk import LaneUse, Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 
 _SHARES: Final = {
@@ -60,7 +62,33 @@ class _Reading:
     at: float
     evaluated: float
     stored: float
-    tasks: TaskTotals
+    tasks: _TaskTotals
+
+
+@dataclass(frozen=True, slots=True)
+class _TaskTotals:
+    """Times of tasks in their workers, summed up [s]."""
+
+    seconds: float = 0.0
+    kernel_seconds: float = 0.0
+    table_seconds: float = 0.0
+    lane_use: LaneUse = field(default_factory=LaneUse)
+
+    def plus(self, report: TaskReport) -> _TaskTotals:
+        return _TaskTotals(
+            self.seconds + report.compute_seconds,
+            self.kernel_seconds + report.kernel_time.seconds,
+            self.table_seconds + report.table_seconds,
+            self.lane_use + report.kernel_time.lane_use,
+        )
+
+    def since(self, earlier: _TaskTotals) -> _TaskTotals:
+        return _TaskTotals(
+            self.seconds - earlier.seconds,
+            self.kernel_seconds - earlier.kernel_seconds,
+            self.table_seconds - earlier.table_seconds,
+            self.lane_use - earlier.lane_use,
+        )
 
 
 def profile_job(
@@ -84,6 +112,13 @@ def profile_job(
         seed=1,
     )
     workers = _open(evaluator, cpus)
+    timed_tasks = _TaskTotals()
+
+    def note(report: TaskReport) -> None:
+        nonlocal timed_tasks
+        timed_tasks = timed_tasks.plus(report)
+
+    observed = ObservedEvaluator(workers, lambda _: nullcontext(note))
     readings: list[_Reading] = []
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(f"sqlite:///{Path(folder, 'jobs.db')}")
@@ -93,11 +128,11 @@ def profile_job(
         def read(done: CompletedIteration, _state: JobState) -> None:
             before = readings[-1].evaluated if readings else 0.0
             evaluated = before + done.evaluate_seconds
-            readings.append(_Reading(time.perf_counter(), evaluated, timed.seconds, workers.totals))
+            readings.append(_Reading(time.perf_counter(), evaluated, timed.seconds, timed_tasks))
 
         try:
             job, _ = store.create_job(spec)
-            run_embedded(store, workers, job.id, on_commit=read)
+            run_embedded(store, observed, job.id, on_commit=read)
             slots = workers.slots
         finally:
             workers.close()

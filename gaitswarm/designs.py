@@ -19,6 +19,7 @@ from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
@@ -102,10 +103,7 @@ class ScenariosRequest(DesignRequest):
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:
-        names = [scenario.name for scenario in self.resolved_scenarios()]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"scenarios: {name!r} is named twice")
+        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
         return self
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:

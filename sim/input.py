@@ -39,6 +39,13 @@ Lines = Annotated[str, AfterValidator(_printable_lines)]
 """The same with line breaks and tabs."""
 
 
+def check_distinct(field: str, names: Sequence[object]) -> None:
+    """Raise ValueError, which names the field, if one of the names occurs twice."""
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{field}: {name!r} is named twice")
+
+
 def alternatives(
     expected: str, *, among_own: Callable[[Any], str] = lambda _: OWN
 ) -> Discriminator:

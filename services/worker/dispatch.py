@@ -8,7 +8,7 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
     TaskReport,
 )
 from gaitswarm.services.worker.chunks import Chunk, Pace, cut
-from gaitswarm.services.worker.tasks import Answer, TaskTotals
+from gaitswarm.services.worker.tasks import Answer
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Case, LongCase, WalkingCase
 from gaitswarm.sim.outcome import Outcome
@@ -133,12 +133,21 @@ class _Iteration:
                 self.request.on_outcome(case, chunk.start, outcome)
 
     def report(
-        self, run: _Running, compute_seconds: float = 0.0, host: str = "", error: str | None = None
+        self, run: _Running, *, answer: Answer | None = None, error: str | None = None
     ) -> None:
-        if self.request.on_task is not None:
-            walks = len(run.chunk.cases) * (run.chunk.stop - run.chunk.start)
-            seconds = time.monotonic() - run.begun
-            self.request.on_task(TaskReport(walks, seconds, compute_seconds, host, error))
+        if self.request.on_task is None:
+            return
+        walks = len(run.chunk.cases) * (run.chunk.stop - run.chunk.start)
+        report = TaskReport(walks, time.monotonic() - run.begun, error=error)
+        if answer is not None:
+            report = replace(
+                report,
+                compute_seconds=answer.seconds,
+                kernel_time=answer.kernel_time,
+                table_seconds=answer.table_seconds,
+                host=answer.host,
+            )
+        self.request.on_task(report)
 
 
 def unlike(host: str, refusal: str) -> ProvenanceChanged:
@@ -164,7 +173,6 @@ class Dispatcher:
     """Requests in progress, from several threads."""
 
     def __init__(self) -> None:
-        self.totals = TaskTotals()
         self._lock = threading.Lock()
         self._active: list[_Iteration] = []
         self._paces: OrderedDict[str, Pace] = OrderedDict()
@@ -257,12 +265,10 @@ class Dispatcher:
         except Exception as error:
             iteration.report(run, error=f"{type(error).__name__}: {error}")
             raise
-        iteration.report(run, answer.seconds, answer.host, answer.refusal or None)
+        iteration.report(run, answer=answer, error=answer.refusal or None)
         iteration.put(run.chunk, answer)
         overhead = time.monotonic() - run.begun - answer.seconds
         iteration.times.append((run.chunk.cost, answer.seconds, overhead))
-        with self._lock:
-            self.totals = self.totals.plus(answer)
 
 
 def awaited(work: Future[T], should_stop: Callable[[], bool]) -> T:

@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.worker.chunks import Chunk
 from gaitswarm.services.worker.dispatch import Dispatcher, Load, build_kernels
-from gaitswarm.services.worker.tasks import Answer, TaskTotals, run_task
+from gaitswarm.services.worker.tasks import Answer, run_task
 from gaitswarm.sim.outcome import Outcome
 
 _Task = tuple[Future[Answer], threading.Event]
@@ -45,11 +45,6 @@ class InProcessEvaluator:
     def place(self) -> str:
         """Number of threads, as text."""
         return f"threads: {self.slots}"
-
-    @property
-    def totals(self) -> TaskTotals:
-        """Totals of all tasks so far."""
-        return self._dispatcher.totals
 
     @property
     def loads(self) -> dict[str, Load]:

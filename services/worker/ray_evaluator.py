@@ -30,7 +30,6 @@ from gaitswarm.services.worker.tasks import (
     Answer,
     Failure,
     Shared,
-    TaskTotals,
     arithmetic_digest,
     run_in_worker,
     warm_up,
@@ -95,11 +94,6 @@ class RayEvaluator:
         workers, nodes = self._connection.slots, self._connection.nodes
         plural = "" if workers == 1 else "s"
         return f"ray: {workers} worker{plural} on {nodes} node{'' if nodes == 1 else 's'}"
-
-    @property
-    def totals(self) -> TaskTotals:
-        """Totals of all tasks so far."""
-        return self._dispatcher.totals
 
     @property
     def loads(self) -> dict[str, Load]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import platform
 import secrets
 import shutil
 import socket
@@ -137,7 +136,8 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
     if address and (os.environ.get("RAY_AUTH_TOKEN") or os.environ.get("RAY_AUTH_TOKEN_PATH")):
         # Ray does not send a token without this.
         os.environ.setdefault("RAY_AUTH_MODE", "token")
-    with _quiet():
+    # What its import and start warn of, a user cannot act on.
+    with warnings.catch_warnings(action="ignore"):
         try:
             import ray  # noqa: PLC0415 - its environment had to be set first
         except ImportError as error:
@@ -250,23 +250,11 @@ def _short_directory() -> str:
 
 
 def _sweep() -> None:
-    """Remove the files of processes that were killed."""
+    """Remove the files of processes that were killed, on systems that list processes."""
     for directory in Path(_short_directory()).glob(f"{_PREFIX}*-*"):
         pid = directory.name.removeprefix(_PREFIX).split("-")[0]
-        if pid.isdecimal() and not _alive(int(pid)):
+        if Path("/proc/self").exists() and not Path("/proc", pid).exists():
             shutil.rmtree(directory, ignore_errors=True)
-
-
-def _alive(pid: int) -> bool:
-    if platform.system() == "Windows":  # where signal 0 is Ctrl-C
-        return True
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
 
 
 @contextmanager
@@ -299,14 +287,6 @@ def _bare(ray: ModuleType) -> Iterator[None]:
     finally:
         for name, start in unused.items():
             setattr(node, name, start)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Suppress warnings of Ray's import and start that a user cannot act on."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
 
 
 def _first_line(error: BaseException) -> str:

@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.run.outage import is_infrastructure
 from gaitswarm.sim.case import Case, run_together
 from gaitswarm.sim.controllers.quantisation import timing_tables
 from gaitswarm.sim.errors import SimulationError
-from gaitswarm.sim.kernel.walk import KernelTime, LaneUse
+from gaitswarm.sim.kernel.walk import KernelTime
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.provenance import Provenance, provenance_of, simulator_digest
 
@@ -45,32 +45,6 @@ class Answer:
     kernel_time: KernelTime = field(default_factory=KernelTime)
     table_seconds: float = 0.0
     refusal: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class TaskTotals:
-    """Times of tasks in their workers, summed up [s]."""
-
-    seconds: float = 0.0
-    kernel_seconds: float = 0.0
-    table_seconds: float = 0.0
-    lane_use: LaneUse = field(default_factory=LaneUse)
-
-    def plus(self, answer: Answer) -> TaskTotals:
-        return TaskTotals(
-            self.seconds + answer.seconds,
-            self.kernel_seconds + answer.kernel_time.seconds,
-            self.table_seconds + answer.table_seconds,
-            self.lane_use + answer.kernel_time.lane_use,
-        )
-
-    def since(self, earlier: TaskTotals) -> TaskTotals:
-        return TaskTotals(
-            self.seconds - earlier.seconds,
-            self.kernel_seconds - earlier.kernel_seconds,
-            self.table_seconds - earlier.table_seconds,
-            self.lane_use - earlier.lane_use,
-        )
 
 
 def run_task(

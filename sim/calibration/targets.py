@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.sim.variables import VariableName, VariableValue
 
@@ -93,10 +94,7 @@ class TargetWalk(BaseModel):
     @model_validator(mode="after")
     def _can_walk(self) -> TargetWalk:
         check_design(self.controller, self.design)
-        names = [scenario.name for scenario in self.resolved_scenarios()]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"scenarios: {name!r} is named twice")
+        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
         return self
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:

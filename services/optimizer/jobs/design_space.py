@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,16 +35,21 @@ class DesignSpace:
     def build(
         cls,
         *,
-        required: Sequence[Variable],
+        required: Sequence[Variable] = (),
         optional: Sequence[Variable],
+        default: Sequence[Variable] | None = None,
         chosen: Sequence[str | Variable] | None,
         fixed: Mapping[str, float | str],
     ) -> DesignSpace:
-        """Combine a catalogue with a user's choice. Raises ValueError."""
+        """Combine a catalogue with a user's choice. Raises ValueError.
+
+        default: what is searched, unless fixed, if nothing was chosen; the required variables.
+        """
         catalogue = VariableCatalogue((*required, *optional))
         fixed_values = _fixed_values(fixed, catalogue)
         if chosen is None:
-            chosen = [variable for variable in required if variable.name not in fixed]
+            searched = required if default is None else default
+            chosen = [variable for variable in searched if variable.name not in fixed]
         variables: list[Variable] = []
         for entry in chosen:
             name = entry if isinstance(entry, str) else entry.name
@@ -102,9 +108,7 @@ class DesignSpace:
 
     def positions(self, designs: Sequence[Mapping[str, float | str]]) -> NDArray[np.float64]:
         """Return the positions of designs given by name. Raises ValueError."""
-        held = {
-            v.name: value for v, (_, value) in zip(self._fixed_variables, self.fixed, strict=True)
-        }
+        held = dict(self.fixed)
         rows = []
         for index, design in enumerate(designs):
             for name, value in design.items():
@@ -118,12 +122,8 @@ class DesignSpace:
             rows.append([_searched(index, v, design) for v in self.variables])
         return self.box.positions(np.array(rows).reshape(len(rows), len(self.variables)))
 
-    @property
-    def _fixed_variables(self) -> tuple[Variable, ...]:
-        return self.catalogue[len(self.variables) :]
-
     def _check_fixed_value(self, where: str, name: str, value: float | str, fixed: float) -> None:
-        variable = next(variable for variable in self._fixed_variables if variable.name == name)
+        variable = next(variable for variable in self.columns if variable.name == name)
         if _number(where, variable, value) != fixed:
             raise ValueError(
                 f"{where}: {value} is not the job's fixed value, {variable.shown(fixed)}; omit it"
@@ -149,10 +149,8 @@ class DesignSpace:
     @property
     def shown_fixed(self) -> dict[str, float | str]:
         """The fixed values by name, for people."""
-        return {
-            v.name: v.shown(value)
-            for v, (_, value) in zip(self._fixed_variables, self.fixed, strict=True)
-        }
+        variables = self.columns[len(self.variables) :]
+        return {v.name: v.shown(value) for v, (_, value) in zip(variables, self.fixed, strict=True)}
 
     def corners(self) -> Iterator[dict[str, float]]:
         """Yield the simulated values at all lower and at all upper bounds, by variable."""
@@ -160,8 +158,15 @@ class DesignSpace:
             (values,) = self.simulated(self.designs(corner.reshape(1, -1)))
             yield dict(zip(self.names, values.tolist(), strict=True))
 
-    def refusal(self, error: SimulationInputError) -> InvalidRequest:
+    @contextmanager
+    def requested(self) -> Iterator[None]:
         """Convert a simulator's error to one that names `fixed` or `variables`."""
+        try:
+            yield
+        except SimulationInputError as error:
+            raise self.refusal(error) from error
+
+    def refusal(self, error: SimulationInputError) -> InvalidRequest:
         culprit = str(error).partition(":")[0]
         return InvalidRequest(
             str(error), field="fixed" if culprit in dict(self.fixed) else "variables"

@@ -14,11 +14,6 @@ from gaitswarm.services.optimizer.jobs.kinds.identification import Identificatio
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.input import message_of
 
-_TUNING: Final = "<tuning>"
-_IDENTIFICATION: Final = "<identification>"
-_CALIBRATION: Final = "<calibration>"
-_CERTIFICATE: Final = "<certificate>"
-
 
 def _kind(value: Any) -> str:
     """Tag of a document or spec; the default kind is tuning."""
@@ -27,10 +22,10 @@ def _kind(value: Any) -> str:
 
 
 AnySpec = Annotated[
-    Annotated[JobSpec, Tag(_TUNING)]
-    | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)]
-    | Annotated[CalibrationSpec, Tag(_CALIBRATION)]
-    | Annotated[CertificateSpec, Tag(_CERTIFICATE)],
+    Annotated[JobSpec, Tag("<tuning>")]
+    | Annotated[IdentificationSpec, Tag("<identification>")]
+    | Annotated[CalibrationSpec, Tag("<calibration>")]
+    | Annotated[CertificateSpec, Tag("<certificate>")],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",

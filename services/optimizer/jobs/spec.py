@@ -252,7 +252,6 @@ class Spec(BaseModel):
             ValueError: Invalid choice; names the variable. Never for a validated spec.
         """
 
-    @abstractmethod
     def check_can_be_simulated(self) -> None:
         """Check what only the simulator can decide: whether designs can be simulated.
 
@@ -260,18 +259,6 @@ class Spec(BaseModel):
             InvalidRequest: Bounds, values or a precision that cannot be simulated here; names the
             field.
         """
-
-    def check_precision(self) -> None:
-        """Raise InvalidRequest if this machine has no compiled kernel for the precision."""
-        try:
-            for robot in self.robot_sources:
-                check_precision(load_robot(robot), self.precision)
-        except SimulationInputError as error:
-            text = str(error).removeprefix("precision: ")
-            raise InvalidRequest(text, field="precision") from error
-
-    def check_optimizer(self) -> None:
-        """Raise InvalidRequest if a library of the search method is missing."""
         method = METHODS[self.search.name]
         if method.missing:
             raise InvalidRequest(
@@ -279,6 +266,12 @@ class Spec(BaseModel):
                 f" {method.remedy}",
                 field="optimizer",
             )
+        try:
+            for robot in self.robot_sources:
+                check_precision(load_robot(robot), self.precision)
+        except SimulationInputError as error:
+            text = str(error).removeprefix("precision: ")
+            raise InvalidRequest(text, field="precision") from error
 
     def check_recordings(self, find: Callable[[str], RecordedWalk]) -> None:
         """Check that the robot has the joints of each recording, and reaches its gait.

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.case import Case
+from gaitswarm.sim.kernel.walk import KernelTime
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.provenance import Provenance
 
@@ -21,6 +22,8 @@ class TaskReport:
     Attributes:
         seconds: from the dispatch to the answer [s].
         compute_seconds: computing time of the worker [s].
+        kernel_time: part of it in kernels, and the use of their lanes.
+        table_seconds: part of it for fuzzy tables [s].
         host: name of the worker's machine; "" without an answer.
         error: cause of failure, for people; None for a result.
     """
@@ -30,6 +33,8 @@ class TaskReport:
     compute_seconds: float = 0.0
     host: str = ""
     error: str | None = None
+    kernel_time: KernelTime = field(default_factory=KernelTime)
+    table_seconds: float = 0.0
 
 
 OnTask = Callable[[TaskReport], None]

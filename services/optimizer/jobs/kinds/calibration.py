@@ -239,12 +239,12 @@ class CalibrationSpec(Spec):
 
     def design_space(self) -> DesignSpace:
         """Return the chosen variables; by default those of the robot."""
-        catalogue, chosen = self.catalogue(), self.variables
-        if chosen is None:
-            chosen = tuple(
-                v for v in robot_variables(self.robot_sources) if v.name not in self.fixed
-            )
-        return DesignSpace.build(required=(), optional=catalogue, chosen=chosen, fixed=self.fixed)
+        return DesignSpace.build(
+            optional=self.catalogue(),
+            default=robot_variables(self.robot_sources),
+            chosen=self.variables,
+            fixed=self.fixed,
+        )
 
     def _check_every_variable_matters(self) -> None:
         of_robot = {variable.name for variable in robot_variables(self.robot_sources)}
@@ -263,44 +263,34 @@ class CalibrationSpec(Spec):
 
         Designs with a searched gait may be out of reach, which their status reports.
         """
-        self.check_optimizer()
-        self.check_precision()
+        super().check_can_be_simulated()
         space, cases = self.design_space(), self._cases()
         of_robot = {variable.name for variable in robot_variables(self.robot_sources)}
         for values in space.corners():
-            try:
+            with space.requested():
                 varied_robot(
                     self.robot_sources, {name: v for name, v in values.items() if name in of_robot}
                 )
-            except SimulationInputError as error:
-                raise space.refusal(error) from error
             for index, case in self._walks(cases):
                 drive = case.drive(values)
                 with requested(f"walks.{index}.design"):
                     law = CONTROLLERS[case.controller].compile(drive)
                     for robot in self.robot_sources:
                         check_drives(law, robot)
-        self._check_gaits(space, cases)
+        # The robots have the named groups of legs, and legs for every gait.
+        values, orders = next(space.corners()), orders_searched(space.variables)
+        for order, (_, case), robot in product(orders, self._walks(cases), self.robot_sources):
+            with space.requested():
+                check_gait(case.scenario, case.drive(values | order), robot=robot)
         searched = {v.name: math.nan for v in space.variables if v.name in GAIT_CATALOGUE}
         for index, case in self._walks(cases):
             drive = case.drive(dict(space.fixed) | searched)
-            if not any(map(_is_nan, drive.values())):
-                self._check_reach(index, case, drive)
-
-    def _check_gaits(self, space: DesignSpace, cases: tuple[CalibrationWalk, ...]) -> None:
-        """Check that the robots have the named groups of legs, and legs for every gait."""
-        values, orders = next(space.corners()), orders_searched(space.variables)
-        for order, (_, case), robot in product(orders, self._walks(cases), self.robot_sources):
-            try:
-                check_gait(case.scenario, case.drive(values | order), robot=robot)
-            except SimulationInputError as error:
-                raise space.refusal(error) from error
-
-    def _check_reach(self, index: int, case: CalibrationWalk, drive: dict[str, float]) -> None:
-        gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
-        for robot in self.robot_sources:
-            with requested(f"walks.{index}"):
-                check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)
+            if any(map(_is_nan, drive.values())):
+                continue
+            gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
+            for robot in self.robot_sources:
+                with requested(f"walks.{index}"):
+                    check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)
 
     @property
     def objectives(self) -> tuple[Objective, ...]:

@@ -26,8 +26,8 @@ from gaitswarm.services.optimizer.search.random_search import RandomSearchSettin
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.mujoco.engines import (
     ENGINES,
     LIBRARY,
@@ -37,20 +37,11 @@ from gaitswarm.sim.mujoco.engines import (
 )
 from gaitswarm.sim.scenario import HELD_OUT, ScenarioChoice, ScenarioName
 from gaitswarm.sim.simulate import check_reach
-from gaitswarm.sim.variables import Variable, VariableName, VariableValue
+from gaitswarm.sim.variables import VariableName, VariableValue
 from gaitswarm.sim.worlds import PERTURBATIONS, EngineWalk, WorldWalk, check_worlds, sample_worlds
 from gaitswarm.sim.worlds.perturbations import NOMINAL
 
 Floats = NDArray[np.float64]
-
-
-def world_space(
-    variables: Sequence[str | Variable] | None, fixed: Mapping[str, float | str]
-) -> DesignSpace:
-    """Return the drawn and fixed perturbations."""
-    if variables is None:
-        variables = tuple(v for v in PERTURBATIONS if v.name not in fixed)
-    return DesignSpace.build(required=(), optional=PERTURBATIONS, chosen=variables, fixed=fixed)
 
 
 def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpace:
@@ -210,9 +201,7 @@ class CertificateSpec(WalksSpec):
     def _can_be_run(self) -> Self:
         if self.optimizer.name != "random":
             raise ValueError("optimizer: must be random")
-        for name in self.engines:
-            if self.engines.count(name) > 1:
-                raise ValueError(f"engines: {name!r} is named twice")
+        check_distinct("engines", self.engines)
         for held_out in self.held_out or ():
             if held_out not in self.case_names:
                 raise ValueError(f"held_out: {held_out!r} is not among the scenarios")
@@ -281,7 +270,9 @@ class CertificateSpec(WalksSpec):
 
     def world_space(self) -> DesignSpace:
         """Return the perturbations; others are as the robot has them."""
-        return world_space(self.variables, self.fixed)
+        return DesignSpace.build(
+            optional=PERTURBATIONS, default=PERTURBATIONS, chosen=self.variables, fixed=self.fixed
+        )
 
     def create_search(self) -> Optimizer:
         """Enumerate the nominal world, then those of `sample_worlds`."""
@@ -305,9 +296,10 @@ class CertificateSpec(WalksSpec):
 
     def check_can_be_simulated(self) -> None:
         """Check the design, the scenarios, and the worlds at both ends of all ranges."""
-        self.check_optimizer()
-        self.check_precision()
-        self._check_engines()
+        super().check_can_be_simulated()
+        if self.engines:
+            with requested("engines"):
+                check_installed()
         with requested("design"):
             law = CONTROLLERS[self.controller].compile(self.numbers)
         self.check_drives(law)
@@ -317,15 +309,8 @@ class CertificateSpec(WalksSpec):
                 check_reach(scenario, names, values, robot=self.robot)
         space = self.world_space()
         corners = np.stack([space.low, space.high])
-        try:
+        with space.requested():
             check_worlds(space.names, space.simulated(space.designs(corners)))
-        except SimulationInputError as error:
-            raise space.refusal(error) from error
-
-    def _check_engines(self) -> None:
-        if self.engines:
-            with requested("engines"):
-                check_installed()
 
     @property
     def held_out_names(self) -> tuple[str, ...]:

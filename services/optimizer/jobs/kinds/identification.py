@@ -13,9 +13,9 @@ from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.preference import Judgement
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.case import Case
-from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.identification.current_fit import LINK_CURRENTS, CurrentFit
 from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import Objective
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
@@ -68,33 +68,25 @@ class IdentificationSpec(Spec):
 
     @model_validator(mode="after")
     def _can_be_run(self) -> IdentificationSpec:
-        for field, values in (("recordings", self.recordings), ("links", self.links)):
-            for value in values:
-                if values.count(value) > 1:
-                    raise ValueError(f"{field}: {value} is named twice")
+        check_distinct("recordings", self.recordings)
+        check_distinct("links", self.links)
         self.design_space()
         return self
 
     def design_space(self) -> DesignSpace:
         """Return the chosen robot parameters; the others stay as described."""
         identifiable = identifiable_variables(load_robot(self.robot))
-        chosen = self.variables
-        if chosen is None:
-            chosen = tuple(v for v in identifiable if v.name not in self.fixed)
         return DesignSpace.build(
-            required=(), optional=identifiable, chosen=chosen, fixed=self.fixed
+            optional=identifiable, default=identifiable, chosen=self.variables, fixed=self.fixed
         )
 
     def check_can_be_simulated(self) -> None:
         """Check that the robot is valid at both ends of all bounds."""
-        self.check_optimizer()
-        self.check_precision()
+        super().check_can_be_simulated()
         robot, space = load_robot(self.robot), self.design_space()
         for values in space.corners():
-            try:
+            with space.requested():
                 with_parameters(robot, values)
-            except SimulationInputError as error:
-                raise space.refusal(error) from error
 
     @property
     def objectives(self) -> tuple[Objective, ...]:

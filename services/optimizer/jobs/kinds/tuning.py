@@ -32,6 +32,7 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import PluginSettings
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
@@ -52,10 +53,7 @@ class WalksSpec(Spec):
 
     @model_validator(mode="after")
     def _scenarios_differ(self) -> Self:
-        names = [scenario.name for scenario in self.resolved_scenarios()]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"scenarios: {name!r} is named twice")
+        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
         return self
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:
@@ -228,17 +226,18 @@ class JobSpec(WalksSpec):
         Designs with a searched gait may be out of reach, which their status reports. Only a
         scenario whose gentlest gait is out of reach is rejected.
         """
-        self.check_optimizer()
-        self.check_precision()
+        super().check_can_be_simulated()
         space, scenarios = self.design_space(), self.resolved_scenarios()
         for design in space.corners():
-            try:
+            with space.requested():
                 law = CONTROLLERS[self.controller].compile(design)
                 with_gait(scenarios[0], _gait_of(design))
-            except SimulationInputError as error:
-                raise space.refusal(error) from error
             self.check_drives(law)
-        self._check_worlds()
+        if self.worlds is not None:
+            variables = self.worlds.variables()
+            ends = np.array([[v.low for v in variables], [v.high for v in variables]])
+            with requested("worlds.ranges"):
+                check_worlds(tuple(v.name for v in variables), ends)
         searches_posture = any(split_name(v.name)[0] in _POSTURE for v in space.variables)
         gentlest = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
         orders = orders_searched(space.variables)
@@ -254,12 +253,6 @@ class JobSpec(WalksSpec):
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
         with requested("case"):
             self.cases({})
-
-    def _check_worlds(self) -> None:
-        variables = () if self.worlds is None else self.worlds.variables()
-        ends = np.array([[v.low for v in variables], [v.high for v in variables]])
-        with requested("worlds.ranges"):
-            check_worlds(tuple(v.name for v in variables), ends)
 
     @property
     def case_names(self) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from typing import Final
@@ -47,6 +47,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
@@ -72,9 +73,13 @@ def evidence(service: JobService, job_id: str) -> bytes:
     files = dict(run.files)
     shown = [] if run.summary is None else [CertificateOnPage(run.summary)]
     best = None if run.best is None else (run.best.iteration, run.best.particle)
+    certificates = every(
+        lambda after: service.store.jobs(state=JobState.SUCCEEDED, kind="certificate", after=after)
+    )
     certified = [
         (place != best, one.created_at, one.id, place, one)
-        for one in _certificates(service)
+        for one in certificates
+        if one.readable
         for place in (certified_place(job.spec, run.columns, one.spec),)
         if place is not None
     ]
@@ -120,7 +125,12 @@ def _run(service: JobService, job: Job) -> _Run:
         for first in range(0, end, _PIECE)
         for link in store.links(job.id, first, min(first + _PIECE, end))
     ]
-    iterations = list(_iterations(service, job))
+    committed = every(
+        lambda after: store.iterations(
+            job.id, after=None if after is None else int(after), limit=_PIECE
+        )
+    )
+    iterations = [IterationView.model_validate(one) for one in committed if one.index < end]
     provenance = ProvenanceDocument(
         records=job.provenance, written_by=job_provenance(spec), kernels=kernels_of(spec)
     )
@@ -216,17 +226,6 @@ def certified_place(
     return int(columns.iteration[rows[0]]), int(columns.particle[rows[0]])
 
 
-def _certificates(service: JobService) -> Iterator[Job]:
-    """All certificates that have succeeded."""
-    after: str | None = None
-    while True:
-        found = service.store.jobs(state=JobState.SUCCEEDED, kind="certificate", after=after)
-        yield from (job for job in found.items if job.readable)
-        if found.next is None:
-            return
-        after = found.next
-
-
 def _evaluation(columns: EvaluationColumns, row: int) -> Evaluation:
     return Evaluation(
         iteration=int(columns.iteration[row]),
@@ -258,18 +257,6 @@ def _job(job: Job, best: Evaluation | None) -> JobDocument:
         budgets=budgets_of(job),
         best=found,
     )
-
-
-def _iterations(service: JobService, job: Job) -> Iterator[IterationView]:
-    after: int | None = None
-    while True:
-        found = service.store.iterations(job.id, after=after, limit=_PIECE)
-        for iteration in found.items:
-            if iteration.index < job.progress.iterations:
-                yield IterationView.model_validate(iteration)
-            after = iteration.index
-        if found.next is None:
-            return
 
 
 def _asks(spec: AnySpec, links: Sequence[Link]) -> bytes:

@@ -19,6 +19,7 @@ from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, Proven
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
@@ -264,24 +265,19 @@ def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) ->
     any_budget: whether its number of iterations may differ.
     """
     wanted = spec.resolved()
-    after: str | None = None
-    while True:
-        page = service.store.jobs(search=spec.name, after=after)
-        for job in page.items:
-            if not job.readable or job.state is JobState.CANCELLED:
-                continue
-            budget = wanted.iterations
-            if job.spec != wanted and not (
-                any_budget and job.spec.with_budget(budget) == wanted.with_budget(budget)
-            ):
-                continue
-            with suppress(ProvenanceChanged):
-                service.check_unchanged(job)
-                if len(job.provenance) <= 1:
-                    return job
-        if page.next is None:
-            return None
-        after = page.next
+    for job in every(lambda after: service.store.jobs(search=spec.name, after=after)):
+        if not job.readable or job.state is JobState.CANCELLED:
+            continue
+        budget = wanted.iterations
+        if job.spec != wanted and not (
+            any_budget and job.spec.with_budget(budget) == wanted.with_budget(budget)
+        ):
+            continue
+        with suppress(ProvenanceChanged):
+            service.check_unchanged(job)
+            if len(job.provenance) <= 1:
+                return job
+    return None
 
 
 @contextmanager

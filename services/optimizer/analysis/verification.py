@@ -26,6 +26,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     fitness_summary,
 )
 from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.listing import every
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
@@ -328,7 +329,7 @@ def check_histories(store: Store) -> list[str]:
 
 
 def _broken(store: Store) -> Iterator[str]:
-    for job_id in _ids(store):
+    for job_id in (job.id for job in every(lambda after: store.jobs(after=after))):
         try:
             job = store.job(job_id)
             problem = _problem(store, job)
@@ -338,16 +339,6 @@ def _broken(store: Store) -> Iterator[str]:
                 yield f"job {job_id} differs from what was committed: {problem}"
         except NotFound:
             continue
-
-
-def _ids(store: Store) -> Iterator[str]:
-    after: str | None = None
-    while True:
-        page = store.jobs(after=after)
-        yield from (job.id for job in page.items)
-        if page.next is None:
-            return
-        after = page.next
 
 
 def _problem(store: Store, job: Job) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -27,6 +27,15 @@ class Page(Generic[T]):
 
     items: tuple[T, ...]
     next: str | None  # the `after` of the following page; None on the last
+
+
+def every(page_after: Callable[[str | None], Page[T]]) -> Iterator[T]:
+    """Yield the items of all pages of a list."""
+    page = page_after(None)
+    yield from page.items
+    while page.next is not None:
+        page = page_after(page.next)
+        yield from page.items
 
 
 @dataclass(frozen=True, slots=True)

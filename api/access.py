@@ -14,7 +14,7 @@ from ipaddress import IPv6Address, ip_address
 from typing import TYPE_CHECKING, Annotated, Final, cast
 
 from anyio.to_thread import run_sync
-from fastapi import Depends, Header, Request, Response
+from fastapi import Depends, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -24,11 +24,8 @@ from gaitswarm.api.problems import problem, too_many_requests, unauthorized
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token
 from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
-from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.job import (
     DEFAULT_PRIORITY,
-    HIGHEST_PRIORITY,
-    LOWEST_PRIORITY,
     Quota,
 )
 from gaitswarm.views.base import PREFIX
@@ -298,14 +295,6 @@ async def may_submit(token: RequestToken) -> str | None:
 Owner = Annotated[str | None, Depends(may_submit)]
 
 
-async def actor(token: RequestToken) -> str:
-    """Return the name that the audit log records."""
-    return LOCAL if token is None else token.name
-
-
-Actor = Annotated[str, Depends(actor)]
-
-
 async def may_administer(token: RequestToken) -> None:
     """Require scope `admin`."""
     if token is not None and not token.scope.allows(TokenScope.ADMIN):
@@ -345,34 +334,3 @@ def check_may_prioritize(token: Token | None, priority: int) -> None:
             f"the token {token.name!r} of scope `{token.scope}` may not set a priority above"
             f" {DEFAULT_PRIORITY}; use one of scope `admin`"
         )
-
-
-async def priority_check(token: RequestToken) -> Callable[[int], None]:
-    """Return a check of the priority that a token may set."""
-    return partial(check_may_prioritize, token)
-
-
-PriorityCheck = Annotated[Callable[[int], None], Depends(priority_check)]
-
-
-async def job_priority(
-    token: RequestToken,
-    priority: Annotated[
-        int,
-        Header(
-            alias="Job-Priority",
-            ge=LOWEST_PRIORITY,
-            le=HIGHEST_PRIORITY,
-            description="Priority of the job: queued jobs start in order of priority, and each step"
-            " doubles the share of workers of a running job. Values above 0 require a token of"
-            " scope `admin`, where tokens are required.",
-            examples=[0],
-        ),
-    ] = DEFAULT_PRIORITY,
-) -> int:
-    """Return the priority of a new job."""
-    check_may_prioritize(token, priority)
-    return priority
-
-
-NewPriority = Annotated[int, Depends(job_priority)]

@@ -19,12 +19,11 @@ from fastapi.responses import JSONResponse, StreamingResponse
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from gaitswarm.api.access import (
-    Actor,
-    NewPriority,
     Owner,
     OwnersQuota,
-    PriorityCheck,
+    RequestToken,
     UntilRevoked,
+    check_may_prioritize,
     may_administer,
     may_command,
     may_submit,
@@ -45,9 +44,15 @@ from gaitswarm.api.events import EVENTS, EventsQuery, EventStream, job_events
 from gaitswarm.jobs.base import job_view
 from gaitswarm.jobs.operation import LARGEST_INDEX, OPERATIONS, Context, Limits, Operation
 from gaitswarm.operations import ServedJobs
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.job import (
+    DEFAULT_PRIORITY,
+    HIGHEST_PRIORITY,
+    LOWEST_PRIORITY,
+    Job,
+)
 from gaitswarm.services.optimizer.jobs.notification import check_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.errors import RobotFileError
@@ -187,11 +192,7 @@ def _refusal(where: Location, problem: str, document: Any) -> RequestValidationE
 
 
 async def request_context(
-    request: Request,
-    actor: Actor,
-    quota: OwnersQuota,
-    check_priority: PriorityCheck,
-    settings: ServerSettings,
+    request: Request, token: RequestToken, quota: OwnersQuota, settings: ServerSettings
 ) -> Context:
     """Return what the server adds to the arguments of an operation."""
     limits = Limits(
@@ -200,8 +201,14 @@ async def request_context(
         sampled=settings.api_max_sampled_seconds,
         ranked=MOST_RANKED,
     )
-    activity = request.state.activity
-    return Context(actor, quota, limits, check_priority, activity, settings.robots)
+    return Context(
+        actor=LOCAL if token is None else token.name,
+        quota=quota,
+        limits=limits,
+        check_priority=partial(check_may_prioritize, token),
+        activity=request.state.activity,
+        robots=settings.robots,
+    )
 
 
 def _endpoint(operation: Operation) -> Callable[..., Any]:
@@ -330,24 +337,30 @@ IdempotencyKey = Annotated[
 ]
 
 
-async def notify_url(
-    settings: ServerSettings,
-    url: Annotated[
-        str | None,
-        Header(
-            alias="Notify-URL",
-            min_length=1,
-            max_length=2000,
-            description="URL that receives a JSON document when the job has ended. The server must"
-            " allow its host. `/v1/jobs/{job_id}/notifications` reports the delivery.",
-            examples=["https://ci.example/hook"],
-        ),
-    ] = None,
-) -> str | None:
-    """Return the checked URL of the notification."""
-    if url is not None:
-        check_url(url, settings.webhook_hosts, field="Notify-URL")
-    return url
+NotifyUrl = Annotated[
+    str | None,
+    Header(
+        alias="Notify-URL",
+        min_length=1,
+        max_length=2000,
+        description="URL that receives a JSON document when the job has ended. The server must"
+        " allow its host. `/v1/jobs/{job_id}/notifications` reports the delivery.",
+        examples=["https://ci.example/hook"],
+    ),
+]
+
+JobPriority = Annotated[
+    int,
+    Header(
+        alias="Job-Priority",
+        ge=LOWEST_PRIORITY,
+        le=HIGHEST_PRIORITY,
+        description="Priority of the job: queued jobs start in order of priority, and each step"
+        " doubles the share of workers of a running job. Values above 0 require a token of scope"
+        " `admin`, where tokens are required.",
+        examples=[0],
+    ),
+]
 
 
 async def request_document(request: Request) -> Any:
@@ -360,17 +373,22 @@ async def request_document(request: Request) -> Any:
 
 
 async def submission(
+    token: RequestToken,
     owner: Owner,
     quota: OwnersQuota,
-    notify: Annotated[str | None, Depends(notify_url)],
-    priority: NewPriority,
+    settings: ServerSettings,
     idempotency_key: IdempotencyKey = None,
+    notify_url: NotifyUrl = None,
+    priority: JobPriority = DEFAULT_PRIORITY,
 ) -> dict[str, Any]:
     """Return what accompanies a new job."""
+    check_may_prioritize(token, priority)
+    if notify_url is not None:
+        check_url(notify_url, settings.webhook_hosts, field="Notify-URL")
     return {
         "owner": owner,
         "quota": quota,
-        "notify_url": notify,
+        "notify_url": notify_url,
         "priority": priority,
         "idempotency_key": idempotency_key,
     }

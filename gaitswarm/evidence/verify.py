@@ -71,7 +71,6 @@ from gaitswarm.views.verification import (
     CheckView,
     DifferenceView,
     HistoryVerificationView,
-    VerificationRequest,
     VerificationView,
 )
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
@@ -150,8 +149,10 @@ class _Report:
 def run_verification(
     service: JobService,
     job_id: str,
-    request: VerificationRequest,
     *,
+    replay: int,
+    seed: int | None,
+    head: str | None,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> HistoryVerificationView:
     """Recompute a job's chain from the store and repeat some evaluations.
@@ -159,20 +160,20 @@ def run_verification(
     `check` is called with the simulated time of these [s].
     """
     job, report = service.job(job_id), _Report()
-    seed = secrets.randbelow(1 << 32) if request.seed is None else request.seed
-    history = check_history(service.store, job, head=request.head)
+    seed = secrets.randbelow(1 << 32) if seed is None else seed
+    history = check_history(service.store, job, head=head)
     if history.problem:
         where = "" if history.broken_at is None else f"iteration {history.broken_at}: "
         report.add("chain", (False, f"{where}{history.problem}"))
     else:
         report.add("chain", _intact(history.iterations, history.head))
-    if request.head is not None:
-        report.add("head", _head(request.head, history.head_found_at, history.iterations))
-    if request.replay and job.readable:
+    if head is not None:
+        report.add("head", _head(head, history.head_found_at, history.iterations))
+    if replay and job.readable:
         report.provenance += _changes(job.spec, job.provenance)
-    if request.replay and history.sizes:
+    if replay and history.sizes:
         rng = np.random.default_rng(seed)
-        answer = _replay_stored(service, job, history, report, request.replay, rng, check)
+        answer = _replay_stored(service, job, history, report, replay, rng, check)
         report.add("replay", answer)
     return HistoryVerificationView(
         job=job.id,

@@ -141,7 +141,7 @@ from gaitswarm.views.job import (
     JobView,
     StateView,
 )
-from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
+from gaitswarm.views.verification import Digest, HistoryVerificationView
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import unzipped, zipped
 
@@ -1156,10 +1156,15 @@ class Jobs(ABC):
         "POST /jobs/{job_id}/verify",
         "verify_history",
         "Verify the stored history",
-        body=VerificationRequest,
+        body="VerificationRequest",
     )
     def verify(
-        self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
+        self,
+        job_id: str,
+        *,
+        replay: Annotated[int, Field(ge=0, le=100_000, examples=[20])] = 0,
+        seed: Annotated[int | None, Field(ge=0, lt=2**63)] = None,
+        head: Digest | None = None,
     ) -> HistoryVerificationView:
         """Recompute the digests of a job's iterations and report the first that differs.
 
@@ -1167,7 +1172,7 @@ class Jobs(ABC):
 
         Args:
             replay: Evaluations to draw and simulate again, besides the best one; 0 for none.
-            seed: Of the draw; None for a random one.
+            seed: Of the draw; by default a random one.
             head: Digest of an iteration noted earlier, as `JobView.head`, that must be in the
                 history.
 
@@ -1180,9 +1185,10 @@ class Jobs(ABC):
         """
         from gaitswarm.evidence.verify import run_verification
 
-        request = VerificationRequest(replay=replay, seed=seed, head=head)
         check = partial(self._context.limits.check_sampled, field="replay")
-        return run_verification(self._service, job_id, request, check=check)
+        return run_verification(
+            self._service, job_id, replay=replay, seed=seed, head=head, check=check
+        )
 
     @robots(
         "POST /recordings",

@@ -324,7 +324,6 @@ def operation(tag: Tag, route: str, id: str, summary: str, **options: Any) -> Ca
                 message = str(error).removeprefix(f"{error.field}: ")
                 raise InvalidRequest(f"{message}, after the first", field="job_ids") from error
 
-        call.operation = made  # type: ignore[attr-defined]
         return cast(F, call)
 
     return add

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from gaitswarm.services.optimizer.views import IterationIndex, JobName, Particle, Request, View
+from gaitswarm.services.optimizer.views import IterationIndex, JobName, Particle, View
 
 DIGEST: Final = "^[0-9a-f]{64}$"
 """Of an iteration: SHA-256, in hexadecimal digits."""
@@ -15,25 +15,6 @@ Digest = Annotated[str, Field(pattern=DIGEST)]
 Certificate = Annotated[
     str | None, Field(description="Identifier of its certificate; null for the job itself.")
 ]
-
-
-class VerificationRequest(Request):
-    """How thoroughly the history of a job is verified."""
-
-    replay: int = Field(
-        default=0,
-        ge=0,
-        le=100_000,
-        description="Evaluations to draw and repeat, besides the best one; 0 for no simulation.",
-        examples=[20],
-    )
-    seed: int | None = Field(
-        default=None, ge=0, lt=2**63, description="Seed of the draw; null for a random one."
-    )
-    head: Digest | None = Field(
-        default=None,
-        description="Digest of an iteration noted earlier: the history must contain it.",
-    )
 
 
 class CheckView(View):

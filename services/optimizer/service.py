@@ -122,7 +122,9 @@ class JobService:
         parent = Parent(
             job,
             columns.rows(rows),
-            lambda: self.store.asked(job_id, 0, request.from_iteration),
+            lambda: tuple(
+                link.positions for link in self.store.links(job_id, 0, request.from_iteration)
+            ),
             last.digest,
         )
         spec, fork = forked(parent, request, self.provenance, longest=self.longest_fork)

@@ -22,13 +22,10 @@ from gaitswarm.services.optimizer.run.coordinator import (
     EvaluationFailed,
     EvaluatorLost,
     Event,
-    LeaseWasLost,
-    PauseSeen,
     Phase,
     Release,
-    StopRequested,
+    Signal,
     Wait,
-    Waited,
     handle,
 )
 from gaitswarm.services.optimizer.run.outage import Backoff
@@ -163,7 +160,7 @@ def test_unreachable_workers_are_retried_indefinitely_after_growing_bounded_paus
         state, (wait,) = handle(state, EvaluatorLost("no route to host"))
         assert isinstance(wait, Wait) and wait.reason == "no route to host"
         delays.append(wait.seconds)
-        state, (again,) = handle(state, Waited())
+        state, (again,) = handle(state, Signal.WAITED)
         assert isinstance(again, Evaluate)
     assert delays[:4] == [1.0, 2.0, 4.0, 4.0]
     assert set(delays[4:]) == {4.0}
@@ -172,7 +169,7 @@ def test_unreachable_workers_are_retried_indefinitely_after_growing_bounded_paus
 def test_a_successful_iteration_resets_the_pauses() -> None:
     state, actions = begin()
     state, _ = handle(state, EvaluatorLost("gone"))
-    state, actions = handle(state, Waited())
+    state, actions = handle(state, Signal.WAITED)
     state, _ = handle(state, evaluated(actions))
     state, _ = handle(state, Committed(JobState.RUNNING))
     _, (wait,) = handle(state, EvaluatorLost("gone"))
@@ -182,7 +179,7 @@ def test_a_successful_iteration_resets_the_pauses() -> None:
 def test_a_pause_does_not_wait_for_workers() -> None:
     state, _ = begin()
     state, _ = handle(state, EvaluatorLost("gone"))
-    _, actions = handle(state, PauseSeen())
+    _, actions = handle(state, Signal.PAUSE_SEEN)
     # The store pauses a pausing job that is given back.
     assert actions == (Release(JobState.QUEUED),)
 
@@ -196,13 +193,13 @@ def test_a_failed_simulation_fails_the_job_with_its_reason() -> None:
 
 def test_a_stop_returns_the_job_to_the_queue() -> None:
     state, _ = begin()
-    assert handle(state, StopRequested())[1] == (Release(JobState.QUEUED),)
+    assert handle(state, Signal.STOP_REQUESTED)[1] == (Release(JobState.QUEUED),)
 
 
 def test_after_the_lease_is_lost_nothing_is_written() -> None:
     state, actions = begin()
     late = evaluated(actions)
-    state, actions = handle(state, LeaseWasLost())
+    state, actions = handle(state, Signal.LEASE_LOST)
     assert actions == ()
     assert handle(state, late) == (state, ())
 

@@ -195,7 +195,8 @@ def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
     forked = fork(store, job, 4, preference=SPEED)
     claim = store.claim("runner", lease_seconds=30.0, job_id=forked.id)
     assert claim is not None and claim.answered is not None
-    state, asked = claim.answered.ask.state, store.asked(job.id, 0, 4)
+    state = claim.answered.ask.state
+    asked = [link.positions for link in store.links(job.id, 0, 4)]
     feedback = [row.fitness for row in store.evaluations_between(forked.id, 0, 3)]
     by_particle = np.array(feedback).reshape(3, PARTICLES)
     assert state["positions"] == asked[3].tolist()

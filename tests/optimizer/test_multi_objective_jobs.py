@@ -63,7 +63,7 @@ def run_through_kills(store: Store, job_id: str) -> Job:
 
 
 def by_iteration(store: Store, job: Job, column: Floats) -> list[Floats]:
-    sizes = [len(asked) for asked in store.asked(job.id, 0, job.progress.iterations)]
+    sizes = [len(link.positions) for link in store.links(job.id, 0, job.progress.iterations)]
     return np.split(column, np.cumsum(sizes)[:-1])
 
 
@@ -76,7 +76,8 @@ def test_the_search_learns_geometric_means_of_each_objective_without_biases(stor
     vectors[columns.failed.any(axis=1)] = math.inf
     feedback = spec().search_feedback(columns.objectives, columns.failed, columns.fitness)
     np.testing.assert_allclose(feedback, vectors, rtol=1e-12)
-    asked = store.asked(job.id, 0, job.progress.iterations)
+    links = store.links(job.id, 0, job.progress.iterations)
+    asked = [link.positions for link in links]
     retraced(job.spec, [job.spec.iterations], asked, by_iteration(store, job, feedback))
     worse = by_iteration(
         store, job, feedback[:, ::-1] * np.arange(1.0, len(feedback) + 1.0)[:, None]

@@ -24,8 +24,8 @@ from gaitswarm.services.optimizer.run.coordinator import (
     EvaluatorLost,
     Event,
     Phase,
+    Signal,
     Wait,
-    Waited,
     handle,
 )
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
@@ -203,7 +203,7 @@ def test_lost_workers_repeat_only_the_reevaluation() -> None:
     assert state.phase is Phase.REEVALUATING and isinstance(reevaluation, Evaluate)
     state, (wait,) = handle(state, EvaluatorLost("no route to host"))
     assert isinstance(wait, Wait)
-    state, (again,) = handle(state, Waited())
+    state, (again,) = handle(state, Signal.WAITED)
     assert isinstance(again, Evaluate) and precision_of(again.request) == "double"
     np.testing.assert_array_equal(again.request.designs, reevaluation.request.designs)
     _, (commit,) = handle(state, Evaluated(walk(again.request), 0.5))

@@ -104,26 +104,16 @@ class Command(StrEnum):
 class JobOrder(StrEnum):
     """Sort order of a list of jobs."""
 
-    CREATED = "created"
-    """Newest first."""
-    FITNESS = "fitness"
-    """Best fitness first, jobs without one last."""
-    NAME = "name"
-    """Case-insensitive, unnamed jobs last."""
-    STATE = "state"
-    """Unfinished jobs first."""
-    EVALUATIONS = "evaluations"
-    """Most evaluations first."""
-    GAIN = "gain"
-    """Greatest gain over the published design first, jobs without one last."""
-    PRIORITY = "priority"
-    """Most urgent first."""
-    ITERATIONS = "iterations"
-    """Most committed iterations first."""
-    RATE = "rate"
-    """Most evaluations per second first, jobs without a rate last."""
-    TIME_LEFT = "time_left"
-    """Least time to the end first, jobs with unknown time last."""
+    CREATED = "created"  # newest first
+    FITNESS = "fitness"  # best fitness first, jobs without one last
+    NAME = "name"  # case-insensitive, unnamed jobs last
+    STATE = "state"  # unfinished jobs first
+    EVALUATIONS = "evaluations"  # most evaluations first
+    GAIN = "gain"  # greatest gain over the published design first, jobs without one last
+    PRIORITY = "priority"  # most urgent first
+    ITERATIONS = "iterations"  # most committed iterations first
+    RATE = "rate"  # most evaluations per second first, jobs without a rate last
+    TIME_LEFT = "time_left"  # least time to the end first, jobs with unknown time last
 
 
 TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {

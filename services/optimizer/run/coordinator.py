@@ -14,11 +14,11 @@ Committed(running)     committing       Evaluate                     evaluating
 Committed(any other)   committing       -                            ended
 Extended               committing       Commit                       committing
 EvaluatorLost          [re]evaluating   Wait                         waiting
-Waited                 waiting          Evaluate                     [re]evaluating, as before
+WAITED                 waiting          Evaluate                     [re]evaluating, as before
 EvaluationFailed       [re]evaluating   Release(failed)              ended
-PauseSeen              waiting          Release(queued)              ended
-StopRequested          any              Release(queued)              ended
-LeaseWasLost           any              -                            ended
+PAUSE_SEEN             waiting          Release(queued)              ended
+STOP_REQUESTED         any              Release(queued)              ended
+LEASE_LOST             any              -                            ended
 
 A new best of a single-precision search is reevaluated in double precision and committed with its
 iteration; the next ask does not depend on it.
@@ -95,11 +95,6 @@ class EvaluatorLost:
 
 
 @dataclass(frozen=True, slots=True)
-class Waited:
-    """The pause is over."""
-
-
-@dataclass(frozen=True, slots=True)
 class Committed:
     """The iteration is stored; the job is in `state` now."""
 
@@ -113,33 +108,16 @@ class Extended:
     job: Job
 
 
-@dataclass(frozen=True, slots=True)
-class PauseSeen:
-    """A heartbeat saw that the job is to pause."""
+class Signal(StrEnum):
+    """Event without content."""
+
+    WAITED = "waited"  # the pause is over
+    PAUSE_SEEN = "pause seen"  # by a heartbeat: the job is to pause
+    STOP_REQUESTED = "stop requested"  # this process is to end; another one continues the job
+    LEASE_LOST = "lease lost"  # the job was cancelled, or belongs to another runner
 
 
-@dataclass(frozen=True, slots=True)
-class StopRequested:
-    """This process is to end; another one continues the job."""
-
-
-@dataclass(frozen=True, slots=True)
-class LeaseWasLost:
-    """The job was cancelled, or belongs to another runner."""
-
-
-Event = (
-    Claimed
-    | Evaluated
-    | EvaluationFailed
-    | EvaluatorLost
-    | Waited
-    | Committed
-    | Extended
-    | PauseSeen
-    | StopRequested
-    | LeaseWasLost
-)
+Event = Claimed | Evaluated | EvaluationFailed | EvaluatorLost | Committed | Extended | Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,9 +245,9 @@ def handle(state: Coordination, event: Event) -> Decision:  # noqa: C901, PLR091
     match state.phase, event:
         case Phase.ENDED, _:
             return state, ()
-        case _, LeaseWasLost():
+        case _, Signal.LEASE_LOST:
             return replace(state, phase=Phase.ENDED), ()
-        case (_, StopRequested()) | (Phase.WAITING, PauseSeen()):
+        case (_, Signal.STOP_REQUESTED) | (Phase.WAITING, Signal.PAUSE_SEEN):
             return _release(state, JobState.QUEUED)
         case Phase.START, Claimed():
             return _start(state, event)
@@ -285,14 +263,18 @@ def handle(state: Coordination, event: Event) -> Decision:  # noqa: C901, PLR091
             return replace(state, phase=Phase.WAITING, failures=failures), (wait,)
         case ((Phase.EVALUATING | Phase.REEVALUATING), EvaluationFailed(reason=reason)):
             return _release(state, JobState.FAILED, reason)
-        case Phase.WAITING, Waited():
+        case Phase.WAITING, Signal.WAITED:
             return _evaluate(state)
         case Phase.COMMITTING, Committed(state=stored):
             return _continue(state, stored)
         case Phase.COMMITTING, Extended(job=job):
             return _commit(replace(state, job=job), _done(state))
         case phase, _:
-            raise ValueError(f"unexpected {type(event).__name__} while {phase}")
+            raise ValueError(f"unexpected {name_of(event)} while {phase}")
+
+
+def name_of(event: Event) -> str:
+    return str(event) if isinstance(event, Signal) else type(event).__name__
 
 
 def _start(state: Coordination, event: Claimed) -> Decision:

@@ -43,16 +43,14 @@ from gaitswarm.services.optimizer.run.coordinator import (
     EvaluatorLost,
     Event,
     Extended,
-    LeaseWasLost,
-    PauseSeen,
     Phase,
     Record,
     Release,
-    StopRequested,
+    Signal,
     Wait,
-    Waited,
     handle,
     iteration_of,
+    name_of,
 )
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
@@ -179,7 +177,7 @@ class _Run:
         except EvaluationStopped:
             return handle(state, self._stopped())
         except Exception as error:  # noqa: BLE001
-            return _fail(state, error, f"a job cannot continue after {type(event).__name__}")
+            return _fail(state, error, f"a job cannot continue after {name_of(event)}")
 
     def execute(self, actions: tuple[Action, ...]) -> Event:
         """Execute actions in order; return the event that answers the last, or an interruption."""
@@ -189,7 +187,7 @@ class _Run:
                 with log_context(iteration=iteration_of(action)):
                     answer = self._do(action)
         except LeaseLost:
-            return LeaseWasLost()
+            return Signal.LEASE_LOST
         except EvaluationStopped:
             return self._stopped()
         except BudgetChanged:
@@ -204,7 +202,7 @@ class _Run:
         return answer
 
     def _stopped(self) -> Event:
-        return LeaseWasLost() if self.heartbeat.lost else StopRequested()
+        return Signal.LEASE_LOST if self.heartbeat.lost else Signal.STOP_REQUESTED
 
     def _do(self, action: Action) -> Event | None:
         match action:
@@ -226,13 +224,13 @@ class _Run:
                 if self.context.on_commit is not None:
                     self.context.on_commit(done, state)
                 if state is JobState.RUNNING and self.drain.is_set():
-                    return StopRequested()
+                    return Signal.STOP_REQUESTED
                 return Committed(state)
             case Wait(seconds=seconds, reason=reason):
                 return self._wait(seconds, reason)
             case Release(state=state, error=error):
                 self._stored(lambda: self.context.store.release(self.claim, state, error=error))
-                return LeaseWasLost()
+                return Signal.LEASE_LOST
 
     def _evaluate(self, request: EvaluationRequest, keys: tuple[bytes, ...]) -> Event:
         if self._should_stop():
@@ -266,10 +264,10 @@ class _Run:
             self.context.on_retry(seconds, reason)
         for _ in self._ticks(seconds):
             if self.heartbeat.state is JobState.PAUSING:
-                return PauseSeen()
+                return Signal.PAUSE_SEEN
             if self.drain.is_set():
-                return StopRequested()
-        return Waited()
+                return Signal.STOP_REQUESTED
+        return Signal.WAITED
 
     def _stored(self, access: Callable[[], T]) -> T:
         """Access the store, retrying indefinitely: an evaluated iteration is expensive."""

@@ -167,19 +167,6 @@ class History(Aggregate):
         best = None if columns is None else _evaluations(columns)[particle]
         return best and replace(best, reevaluation=again[0][1] if again else None)
 
-    def asked(self, job_id: str, first: int, last: int) -> tuple[NDArray[np.float64], ...]:
-        """Return the (n, d) positions asked for in a range of committed iterations."""
-        query = (
-            select(iterations.c.positions)
-            .where(*_between(iterations, job_id, first, last))
-            .where(iterations.c.committed_at.is_not(None))
-            .order_by(iterations.c.iteration)
-        )
-        with self._database.read("asked") as connection:
-            require_job(connection, job_id)
-            rows = connection.execute(query).scalars().all()
-        return tuple(np.array(positions, dtype=np.float64) for positions in rows)
-
     def reevaluations(
         self, job_id: str, first: int = 0, last: int = _LARGEST_INDEX
     ) -> tuple[tuple[int, Reevaluation], ...]:

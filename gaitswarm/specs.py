@@ -256,25 +256,17 @@ Design = dict[str, float | str]
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """A design of a file."""
-
-    line: int  # where it ends, from 1
-    fitness: float | None  # in the file, minimized
-    design: Design
-
-
-@dataclass(frozen=True, slots=True)
 class StartFile:
-    """Designs of a CSV file, in the order in which a search is to begin with them."""
+    """Designs of a CSV file, in the order in which a search is to begin with them.
+
+    Attributes:
+        lines: Where each design ends in the file, from 1.
+        designs: The designs, as the `start` of a spec has them.
+    """
 
     path: Path
-    rows: tuple[Row, ...]
-
-    @property
-    def designs(self) -> tuple[Design, ...]:
-        """The designs, as the `start` of a spec has them."""
-        return tuple(row.design for row in self.rows)
+    lines: tuple[int, ...]
+    designs: tuple[Design, ...]
 
     def located(self, error: InvalidRequest) -> InvalidRequest:
         """Add the place in the file to an error."""
@@ -282,7 +274,7 @@ class StartFile:
         if place is None:
             return error
         index, column = int(place[1]), place[2]
-        where = f"{self.path}, line {self.rows[index].line}"
+        where = f"{self.path}, line {self.lines[index]}"
         where += f", column {column}" if column else ""
         message = str(error).removeprefix(f"{error.field}: ")
         return InvalidRequest(f"{where}: {message}", field="start")
@@ -318,20 +310,22 @@ def read_designs(path: Path, count: int | None = None) -> StartFile:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="start") from error
     except (csv.Error, UnicodeDecodeError) as error:
         raise InvalidRequest(f"{path} is not a CSV file: {error}", field="start") from error
-    rows.sort(key=lambda row: -math.inf if row.fitness is None else row.fitness)
-    different: dict[tuple[Any, ...], Row] = {}
-    for row in rows:
-        different.setdefault(tuple(row.design.items()), row)
+    rows.sort(key=lambda row: row[0])
+    different: dict[tuple[Any, ...], tuple[int, Design]] = {}
+    for _, line, design in rows:
+        different.setdefault(tuple(design.items()), (line, design))
     if not different:
         raise InvalidRequest(
             f"{path} has no designs; its first line names variables, and every other line is a"
             " design",
             field="start",
         )
-    return StartFile(path, tuple(different.values())[:count])
+    lines, designs = zip(*different.values(), strict=True)
+    return StartFile(path, lines[:count], designs[:count])
 
 
-def _rows(reader: csv.DictReader[str]) -> Iterator[Row]:
+def _rows(reader: csv.DictReader[str]) -> Iterator[tuple[float, int, Design]]:
+    """Yield fitness, line and design; a file without fitness is in order."""
     names = list(reader.fieldnames or ())
     exported = any(name.startswith(_DESIGN) for name in names)
     for cells in reader:
@@ -342,11 +336,9 @@ def _rows(reader: csv.DictReader[str]) -> Iterator[Row]:
             text = (cells[name] or "").strip()
             if text and name != _FITNESS and name.startswith(_DESIGN if exported else ""):
                 design[name.removeprefix(_DESIGN)] = _value(text)
-        fitness = _value((cells.get(_FITNESS) or "nan").strip()) if _FITNESS in names else None
-        if fitness is None:
-            yield Row(reader.line_num, None, design)
-        elif isinstance(fitness, float) and math.isfinite(fitness):
-            yield Row(reader.line_num, fitness, design)
+        fitness = _value((cells[_FITNESS] or "nan").strip()) if _FITNESS in names else 0.0
+        if isinstance(fitness, float) and math.isfinite(fitness):
+            yield fitness, reader.line_num, design
 
 
 def _value(text: str) -> float | str:

@@ -235,7 +235,7 @@ def _endpoint(operation: Operation) -> Callable[..., Any]:
     if operation.request is not None and operation.method == "GET":
         kinds["request"] = Annotated[operation.request, Query()]
     elif operation.request is not None:
-        kind = operation.request | None if operation.is_optional else operation.request
+        kind = operation.request | None if operation.optional else operation.request
         name = operation.names[0] if operation.is_whole else "request"
         kinds["request"] = Annotated[kind, Depends(validated(kind, name))]
     parameters = [inspect.Parameter(name, _KIND, annotation=kind) for name, kind in kinds.items()]

@@ -480,6 +480,7 @@ class Jobs(ABC):
         access="command",
         status=202,
         body="ResumeRequest",
+        optional=True,
     )
     def resume(
         self, job_id: str, *, accept_changes: Annotated[bool, Field(examples=[True])] = False

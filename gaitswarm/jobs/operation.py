@@ -153,6 +153,7 @@ class Operation:
         heavy: Whether it simulates or reads whole histories; a server limits how many run.
         access: Permission that a token needs.
         status: Of a successful response.
+        optional: Whether a request may have no body.
         media_type: Of answers that are bytes.
         media_types: By `format`, of answers that are streams of bytes.
         filename: Name of the download, with arguments.
@@ -171,6 +172,7 @@ class Operation:
     access: Access = "read"
     status: int = 200
     body: str | type[BaseModel] | None = None
+    optional: bool = False
     media_type: str = BINARY
     media_types: Mapping[str, str] = field(default_factory=dict)
     filename: str | None = None
@@ -247,13 +249,6 @@ class Operation:
         described = Field(description=self.docstring.arguments.get(name))
         annotation = Annotated[hint, described] if described.description else hint
         return name, (annotation, ... if default is inspect.Parameter.empty else default)
-
-    @property
-    def is_optional(self) -> bool:
-        """Whether a request may have no body."""
-        return isinstance(self.body, str) and not any(
-            entry.is_required() for entry in self.request.model_fields.values()
-        )
 
     def validated(self, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], BaseModel | None]:
         """Split arguments into parameters of the path and the request.

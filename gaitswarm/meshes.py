@@ -105,7 +105,9 @@ class MeshLibrary:
 
     def _robots(self) -> Iterator[tuple[Path, str]]:
         """Folders with the text of their robot.urdf, of those that can be read."""
-        folders = [place for folder in self._folders for place in (folder, *_inside(folder))]
+        folders = []
+        for folder in self._folders:
+            folders += [folder, *sorted(path.parent for path in folder.glob("*/robot.urdf"))]
         for folder in folders[:_MOST_ROBOTS]:
             try:
                 with (folder / "robot.urdf").open(encoding="utf-8") as file:
@@ -114,13 +116,6 @@ class MeshLibrary:
             except (OSError, ValueError, RobotFileError):
                 continue
             yield folder, text
-
-
-def _inside(folder: Path) -> list[Path]:
-    try:
-        return sorted(place for place in folder.iterdir() if place.is_dir())
-    except OSError:
-        return []
 
 
 LARGEST_COPY: Final = 256 * 1024 * 1024

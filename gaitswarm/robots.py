@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree as ET
@@ -338,19 +337,17 @@ def init_robot(
         raise InvalidRequest(
             f"{folder} exists and is not empty; name another folder", field="output"
         )
-    try:
-        with source.open(encoding="utf-8") as file:
-            text = file.read(LONGEST_URDF + 1)
-    except UnicodeDecodeError as error:
-        raise InvalidRequest(not_utf8(source, error), field="urdf") from error
-    except OSError as error:
-        raise InvalidRequest(f"cannot read {source}: {error}", field="urdf") from error
+    text = read_text(source, field="urdf", most=LONGEST_URDF + 1)
     chosen = (own_name(text) or source.stem) if name is None else name
     check_name(chosen)
     frame = frame_of(up, forward)
+    places = [Path(package) for package in packages]
+
+    def bounds(mesh: str) -> NDArray[np.float64] | None:
+        path = found_mesh(mesh, source.parent, places).path
+        return None if path is None else mesh_bounds(path)
+
     try:
-        places = [Path(package) for package in packages]
-        bounds = partial(_bounds, folder=source.parent, packages=places)
         proposal = walking_proposal(text, chosen, actuator, frame, bounds)
     except RobotFileError as error:
         said = str(error).replace("robot.urdf", source.name, 1)
@@ -367,13 +364,18 @@ def init_robot(
     return MadeRobot(chosen, proposal.notes, copies)
 
 
-def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
-    """What to say of a file that cannot be decoded."""
-    byte = error.object[error.start]
-    return (
-        f"cannot read {path}: it is not UTF-8 text (byte 0x{byte:02x} at {error.start}); save it as"
-        " UTF-8"
-    )
+def read_text(path: Path, *, field: str, most: int = -1) -> str:
+    """Read a file of a robot, up to a number of characters."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            return file.read(most)
+    except UnicodeDecodeError as error:
+        place = f"byte 0x{error.object[error.start]:02x} at {error.start}"
+        raise InvalidRequest(
+            f"cannot read {path}: it is not UTF-8 text ({place}); save it as UTF-8", field=field
+        ) from error
+    except OSError as error:
+        raise InvalidRequest(f"cannot read {path}: {error}", field=field) from error
 
 
 def check_name(name: str) -> None:
@@ -406,12 +408,6 @@ def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
             field="forward",
         )
     return frame
-
-
-def _bounds(name: str, folder: Path, packages: Sequence[Path]) -> NDArray[np.float64] | None:
-    """Bounds of a mesh that can be used."""
-    path = found_mesh(name, folder, packages).path
-    return None if path is None else mesh_bounds(path)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias, TypedDict, TypeVar, Unpack, cast, over
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import invalid_request, simulation_errors
-from gaitswarm.robots import robot_defaults
+from gaitswarm.robots import read_text, robot_defaults
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -236,13 +236,13 @@ def _read_folder(folder: Path) -> dict[str, Any]:
             " holds robot.toml and robot.urdf",
             field="robot",
         )
-    try:
-        return {
-            kind: (folder / f"robot.{kind}").read_text(encoding="utf-8")
-            for kind in ("toml", "urdf")
-        }
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidRequest(f"{folder} is not a robot's folder: {error}", field="robot") from error
+    files = {kind: folder / f"robot.{kind}" for kind in ("toml", "urdf")}
+    missing = ", ".join(path.name for path in files.values() if not path.is_file())
+    if missing:
+        raise InvalidRequest(
+            f"{folder} is not a robot's folder: No such file: {missing}", field="robot"
+        )
+    return {kind: read_text(path, field="robot") for kind, path in files.items()}
 
 
 _DESIGN: Final = "design."

@@ -186,10 +186,7 @@ def decoded_table(spec: Spec, content: bytes) -> EvaluationColumns:
     table = pq.read_table(pa.BufferReader(content))
 
     def whole(name: str) -> NDArray[np.int64]:
-        column = table.column(name).to_numpy()
-        if column.dtype.kind != "i":
-            raise ValueError(f"{name} is not a column of integers")
-        return np.asarray(column, dtype=np.int64)
+        return np.asarray(table.column(name).to_numpy().astype(np.int64, casting="safe"))
 
     def numbers(name: str) -> Floats:
         # Null becomes NaN.
@@ -221,14 +218,24 @@ def encoded_table(
 ) -> Iterator[bytes]:
     """Encode evaluations of a job as a file, piece by piece."""
     import pyarrow as pa
-
-    def batch(piece: EvaluationColumns) -> pa.RecordBatch:
-        arrays = [_arrow(column) for column in _flat(spec, piece).values()]
-        return pa.record_batch(arrays, schema=schema)
+    import pyarrow.csv as pc
+    import pyarrow.parquet as pq
 
     empty = {name: _arrow(column) for name, column in _flat(spec, _no_rows(spec)).items()}
     schema = pa.schema([(name, array.type) for name, array in empty.items()])
-    return (_csv if file_format == "csv" else _parquet)(schema, map(batch, pieces))
+    # Names of columns and statuses have no character that would need quotes.
+    options = pc.WriteOptions(quoting_style="none", quoting_header="none", eol="\r\n")
+    sink = _Sink()
+    with (
+        pc.CSVWriter(sink, schema, write_options=options)
+        if file_format == "csv"
+        else pq.ParquetWriter(sink, schema)
+    ) as writer:
+        for piece in pieces:
+            arrays = [_arrow(column) for column in _flat(spec, piece).values()]
+            writer.write_batch(pa.record_batch(arrays, schema=schema))
+            yield sink.take()
+    yield sink.take()
 
 
 def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
@@ -279,30 +286,6 @@ def _arrow(column: Column) -> pa.Array:
     if column.dtype.kind == "U":
         return pa.array(column.tolist(), type=pa.string())
     return pa.array(column, mask=np.isnan(column) if column.dtype.kind == "f" else None)
-
-
-def _csv(schema: pa.Schema, batches: Iterable[pa.RecordBatch]) -> Iterator[bytes]:
-    import pyarrow.csv as pc
-
-    # Names of columns and statuses have no character that would need quotes.
-    options = pc.WriteOptions(quoting_style="none", quoting_header="none", eol="\r\n")
-    sink = _Sink()
-    with pc.CSVWriter(sink, schema, write_options=options) as writer:
-        for batch in batches:
-            writer.write_batch(batch)
-            yield sink.take()
-    yield sink.take()
-
-
-def _parquet(schema: pa.Schema, batches: Iterable[pa.RecordBatch]) -> Iterator[bytes]:
-    import pyarrow.parquet as pq
-
-    sink = _Sink()
-    with pq.ParquetWriter(sink, schema) as writer:
-        for batch in batches:
-            writer.write_batch(batch)
-            yield sink.take()
-    yield sink.take()
 
 
 class _Sink(io.RawIOBase):

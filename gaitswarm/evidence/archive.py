@@ -296,7 +296,7 @@ def _asks(content: bytes, spec: AnySpec) -> tuple[Floats, ...]:
     table = _checked_table(content, ASKS)
     try:
         names = [f"position.{variable.name}" for variable in spec.design_space().variables]
-        iteration = _whole(table.column("iteration").to_numpy())
+        iteration = table.column("iteration").to_numpy().astype(np.int64, casting="safe")
         columns = [np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in names]
     except (KeyError, ValueError, TypeError) as error:
         raise BadArchive(f"{ASKS} is not a table of this job: {type(error).__name__}") from error
@@ -307,12 +307,6 @@ def _asks(content: bytes, spec: AnySpec) -> tuple[Floats, ...]:
     if not np.isin(steps, (0, 1)).all():
         raise BadArchive(f"{ASKS} is not in the order of its iterations")
     return tuple(np.split(positions, np.flatnonzero(steps)))
-
-
-def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
-    if column.dtype.kind != "i":
-        raise ValueError("not a column of integers")
-    return column.astype(np.int64)
 
 
 def _checked_table(content: bytes, name: str) -> pa.Table:

@@ -201,7 +201,7 @@ def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[st
 
 def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
     from gaitswarm.cli.inputs import chosen_robot, chosen_scenarios, given_design, robot_defaults
-    from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_walks
+    from gaitswarm.services.optimizer.jobs.kinds.certificate import certificate_walks
 
     robot = options.get("robot")
     given = given_design(design, options.get("controller"), robot=robot, place=Place(None, db))

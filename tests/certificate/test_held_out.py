@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gaitswarm.services.optimizer.jobs.kinds.held_out import (
+from gaitswarm.services.optimizer.jobs.kinds.certificate import (
     CASES,
     LEAST,
     certificate_scenarios,

@@ -11,8 +11,11 @@ from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
-from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.held_out import CASES, certificate_scenarios
+from gaitswarm.services.optimizer.jobs.kinds.certificate import (
+    CASES,
+    CertificateSpec,
+    certificate_scenarios,
+)
 from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS
 from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
 from tests.certificate.examples import DOCUMENT, PI, small

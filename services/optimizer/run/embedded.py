@@ -13,8 +13,13 @@ from gaitswarm.services.optimizer.errors import GaitswarmError, LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
-from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, RunContext, run_claim
-from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
+from gaitswarm.services.optimizer.run.execution import (
+    Heartbeat,
+    OnCommit,
+    OnRetry,
+    RunContext,
+    run_claim,
+)
 from gaitswarm.services.optimizer.run.runner import runner_name
 
 if TYPE_CHECKING:

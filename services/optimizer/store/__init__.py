@@ -35,6 +35,15 @@ class Store(Jobs, JobList, Leases, History, Recordings, Audit):
         first, last: index of the first iteration of a range, and index after its last.
         after: `next` of the page before; InvalidRequest for any other text.
         limit: maximum number of items of a page; InvalidRequest if it is less than 1.
+        search: part of a name or id and of what else a list shows as text, in any case.
+        archived: only jobs that are archived, or that are not; None for both.
+        spec: resolved before it is stored.
+        provenance: of the results; None if a runner is to record it.
+        seconds: simulated time of the whole budget [s]; None if unknown.
+        priority: within bounds; higher ones are claimed first.
+        iterations: total budget.
+        change, reference: new value.
+        kept: whether deletion is refused.
         runner: name of a runner, unique to its process.
         lease_seconds: duration of a lease from now on, at most `LONGEST_LEASE_SECONDS` [s].
         actor: name of a token, or `LOCAL`, for the audit log.

@@ -67,7 +67,6 @@ class JobList(Aggregate):
             state: only jobs in this state.
             kind: only jobs of this kind.
             parent: only forks of the job of this id.
-            search: part of a name, id, note or tag, in any case.
             where: further criteria.
             order: sort order; jobs without a value are last, also in the reverse order.
             reverse: whether to reverse the order.
@@ -105,11 +104,7 @@ class JobList(Aggregate):
         return Page(items, to_cursor(cursor, rows[limit - 1].sort_key, items[-1].id))
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
-        """Count jobs by facet.
-
-        Args:
-            archived: only jobs that are archived, or that are not; None for both.
-        """
+        """Count jobs by facet."""
         counts = FacetCounts()
         table = jobs.c
         columns = (table.state, table.robot, table.controller, table.preference, table.tags)

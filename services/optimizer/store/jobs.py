@@ -105,16 +105,12 @@ class Jobs(Aggregate):
         """Insert a queued job, or return the one that the same key created before.
 
         Args:
-            spec: resolved before it is stored.
-            provenance: of the results; None if the first claim is to record it.
             idempotency_key: a repeated request with it creates no second job, even if presets or
                 defaults have changed in between.
             request: JSON document of the request as sent; None for the fields set in the spec.
             fork: origin of a forked job, whose history is copied.
             owner: name of the token of the request.
             notify_url: checked URL that is notified of the job's end.
-            seconds: simulated time of the whole budget [s]; None if unknown.
-            priority: within bounds; higher ones are claimed first.
 
         Returns:
             The job, and whether it is new.
@@ -168,12 +164,7 @@ class Jobs(Aggregate):
         lease_seconds: float,
         provenance: JobProvenance | None = None,
     ) -> Claim:
-        """Insert a running job leased by a runner, which no other can claim in between.
-
-        Args:
-            spec: resolved before it is stored.
-            provenance: of the results; None if the runner is to record it.
-        """
+        """Insert a running job leased by a runner, which no other can claim in between."""
         with self._database.write("create_claimed_job") as connection:
             columns = {"provenance": provenance_document(first_record(provenance))}
             row = self._insert(connection, spec.resolved(), columns)
@@ -295,10 +286,6 @@ class Jobs(Aggregate):
         Committed iterations and the open ask stay; later asks are made under the new budget, as
         the runner detects it at its next commit.
 
-        Args:
-            iterations: total budget.
-            seconds: simulated time of the new budget [s]; None if unknown.
-
         Returns:
             The changed job, queued if it had succeeded.
 
@@ -326,9 +313,6 @@ class Jobs(Aggregate):
     def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
         """Change an unfinished job's priority, which its runner reads at the next renewal.
 
-        Args:
-            priority: within bounds; higher ones are claimed first.
-
         Raises:
             Conflict: the job has ended.
         """
@@ -342,11 +326,7 @@ class Jobs(Aggregate):
             return to_job(update_job(connection, row, {"priority": priority}))
 
     def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
-        """Change a job's labels; results do not depend on them.
-
-        Args:
-            change: new labels.
-        """
+        """Change a job's labels; results do not depend on them."""
         with self._database.write("label") as connection:
             row = job_row(connection, job_id, lock=True)
             labels, spec = change.applied(labels_of(row)), row["spec"]
@@ -359,22 +339,14 @@ class Jobs(Aggregate):
             return to_job(update_job(connection, row, columns))
 
     def note_reference(self, job_id: str, reference: Reference) -> None:
-        """Store the reference of a job's best design, unless one is stored or the job is gone.
-
-        Args:
-            reference: published or start design, evaluated in the job's cases.
-        """
+        """Store the reference of a job's best design, unless one is stored or the job is gone."""
         unset = update(jobs).where(jobs.c.id == job_id, jobs.c.reference_kind.is_(None))
         columns = {f"reference_{name}": value for name, value in asdict(reference).items()}
         with self._database.write("note_reference") as connection:
             connection.execute(unset.values(columns))
 
     def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
-        """Protect a job from deletion, or release it.
-
-        Args:
-            kept: whether it is protected.
-        """
+        """Protect a job from deletion, or release it."""
         with self._database.write("keep") as connection:
             row = job_row(connection, job_id, lock=True)
             action = AuditAction.KEEP if kept else AuditAction.RELEASE

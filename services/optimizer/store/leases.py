@@ -50,11 +50,7 @@ _log = logging.getLogger(__name__)
 
 
 class Leases(Aggregate):
-    """Operations of runners.
-
-    Methods that take a claim raise LeaseLost, and change nothing, unless the claim's token is the
-    job's: a lease that has expired but was not taken over is still valid.
-    """
+    """Operations of runners."""
 
     def claim(
         self,
@@ -73,7 +69,6 @@ class Leases(Aggregate):
         without release counts as a crash until the next commit or resumption.
 
         Args:
-            lease_seconds: duration of the lease, at most `LONGEST_LEASE_SECONDS` [s].
             job_id: the only job to claim; None for any.
             quarantine_after: consecutive crashes after which a job fails.
 
@@ -115,7 +110,6 @@ class Leases(Aggregate):
         """Prolong a lease.
 
         Args:
-            lease_seconds: duration from now on [s].
             waiting: reason for waiting, shown to users; None if the job does not wait.
 
         Returns:
@@ -134,9 +128,6 @@ class Leases(Aggregate):
         """Record the provenance from the next iteration on, unless it is unchanged.
 
         Clears the user's acceptance of changes.
-
-        Args:
-            provenance: of the runner.
         """
         with self._held("record_provenance", claim) as (connection, row):
             before = provenance_records(row["provenance"])

@@ -85,11 +85,7 @@ class Recordings(Aggregate):
     def recording_list(
         self, *, search: str = "", after: str | None = None, limit: int = 50
     ) -> Page[RecordingEntry]:
-        """Return a page of recorded walks, newest first. New walks do not shift later pages.
-
-        Args:
-            search: part of an id, scenario or controller, in any case.
-        """
+        """Return a page of recorded walks, newest first. New walks do not shift later pages."""
         limit = checked_limit(limit)
         table = recordings.c
         columns = (table[field.name] for field in fields(RecordingEntry))

@@ -94,7 +94,7 @@ def _header(path: Path, line: int, columns: list[str]) -> list[str]:
 
 
 def _walk(path: Path, line: int, name: str, cells: Mapping[str, str]) -> dict[str, Any]:
-    from gaitswarm.sim.calibration.targets import TargetWalk
+    from gaitswarm.sim.calibration import TargetWalk
 
     for column, cell in cells.items():
         if not cell:
@@ -139,7 +139,7 @@ def _design(path: Path, line: int, cells: Mapping[str, str]) -> dict[str, Any]:
 def _target(
     path: Path, line: int, row: Mapping[str, str], walks: Mapping[str, dict[str, Any]]
 ) -> dict[str, Any]:
-    from gaitswarm.sim.calibration.targets import QUANTITIES, Target
+    from gaitswarm.sim.calibration import QUANTITIES, Target
 
     document: dict[str, Any] = {
         "walk": row["walk"],

@@ -55,9 +55,9 @@ from gaitswarm.services.optimizer.search.hype import HypeSettings
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
-from gaitswarm.sim.calibration.targets import Target, TargetWalk
+from gaitswarm.sim.calibration import Target, TargetWalk
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Status
 from gaitswarm.sim.robot import RobotFiles, RobotVariant

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.listing import RecordingEntry
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
+from gaitswarm.sim.identification import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk, Quantity
 from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise

@@ -139,7 +139,7 @@ def record(
     place: Place,
 ) -> Printed:
     """Store a measured walk for identification, and print the recording's id."""
-    from gaitswarm.sim.identification.recorded_walk import record as recorded
+    from gaitswarm.sim.identification import record as recorded
 
     walk = options.read(place)
     log = read_measured(measured, walk.robot)

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.sim.identification import RecordedWalk, Recordings
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 from gaitswarm.tables import decoded_table

@@ -59,7 +59,7 @@ from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import finite
 from gaitswarm.settings import place_of
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.mujoco.engines import ENGINE
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.provenance import provenance_of

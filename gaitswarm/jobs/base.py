@@ -113,7 +113,7 @@ from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import SimulationResult, SimulationView, run_simulation

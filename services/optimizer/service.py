@@ -35,7 +35,7 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_prov
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from gaitswarm.services.optimizer.run.runner import runner_name
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import RecordedWalk
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store

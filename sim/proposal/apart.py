@@ -13,8 +13,8 @@ from gaitswarm.sim.proposal.feet import MeshBounds, no_meshes
 from gaitswarm.sim.proposal.frame import AS_IT_IS, Frame
 from gaitswarm.sim.proposal.gait import walk_within_reach
 from gaitswarm.sim.robot import bounds
+from gaitswarm.sim.robot.elements import by_line
 from gaitswarm.sim.robot.robot import parse_robot
-from gaitswarm.sim.robot.urdf_errors import by_line
 
 SECONDS: Final = 40.0
 """Time limit of a proposal [s]; one takes tenths of a second, the first a second more."""

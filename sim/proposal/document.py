@@ -11,29 +11,33 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from gaitswarm.sim.proposal.actuators import (
-    ACTUATOR_NOTES,
-    actuator_tables,
-    drive_names,
-    proposed_control,
-    quoted,
-)
 from gaitswarm.sim.proposal.drive import (
+    ACTUATOR_NOTES,
     ActuatorChoice,
     DriveNumbers,
     SoleNumbers,
+    actuator_tables,
     chosen_kind,
+    drive_names,
     propose_drives,
     propose_sole,
+    proposed_control,
+    quoted,
 )
 from gaitswarm.sim.proposal.feet import MeshBounds, no_meshes
-from gaitswarm.sim.proposal.frame import AS_IT_IS, Frame, sideways, turned
+from gaitswarm.sim.proposal.frame import (
+    AS_IT_IS,
+    Frame,
+    fixed_joint,
+    sideways,
+    turned,
+    with_elements,
+)
 from gaitswarm.sim.proposal.gait import alternating_phases, propose_scenarios
 from gaitswarm.sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
 from gaitswarm.sim.proposal.stance import Stance, choose_stance
-from gaitswarm.sim.proposal.xml_text import fixed_joint, with_elements
+from gaitswarm.sim.robot.elements import by_line
 from gaitswarm.sim.robot.urdf import parse_urdf, unphysical
-from gaitswarm.sim.robot.urdf_errors import by_line
 
 _LEVEL: Final = 0.2
 """Accepted height of hips above or below the body's origin, relative to the legs' length."""

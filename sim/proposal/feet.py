@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.proposal.xml_text import fixed_joint
+from gaitswarm.sim.proposal.frame import fixed_joint
 from gaitswarm.sim.robot.shapes import visual_meshes
 from gaitswarm.sim.robot.urdf import Solid, Urdf
 

@@ -29,11 +29,10 @@ from gaitswarm.sim.robot.description import (
     Sensors,
     Supply,
 )
-from gaitswarm.sim.robot.elements import MOST_TURNED
+from gaitswarm.sim.robot.elements import MOST_TURNED, by_line
 from gaitswarm.sim.robot.inertia import BodyInertia
 from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 from gaitswarm.sim.robot.urdf import Urdf, parse_urdf
-from gaitswarm.sim.robot.urdf_errors import by_line
 
 _TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
 _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.robot.bounds import check_urdf, shortened
-from gaitswarm.sim.robot.elements import Origin, numbers_of, origin_of
+from gaitswarm.sim.robot.elements import Origin, by_line, numbers_of, origin_of, with_line
 from gaitswarm.sim.robot.inertia import NO_INERTIA, BodyInertia, product
 from gaitswarm.sim.robot.joints import Joint, joint_of, standardise
-from gaitswarm.sim.robot.urdf_errors import by_line, with_line
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
 from gaitswarm.sim.robot import load_robot

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaitswarm.sim.calibration.walk import CalibrationWalk, robot_variables
+from gaitswarm.sim.calibration import CalibrationWalk, robot_variables
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from gaitswarm.sim.robot.identifiable import with_parameters

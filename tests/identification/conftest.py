@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
+from gaitswarm.sim.identification import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_log import simulated_log
 from gaitswarm.sim.measurement.synchronise import synchronise
 from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log

@@ -11,8 +11,7 @@ from pydantic import ValidationError
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.identification.current_fit import CurrentFit, recorded_currents
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import CurrentFit, RecordedWalk, recorded_currents
 from gaitswarm.sim.measurement.measured_log import simulated_log
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot

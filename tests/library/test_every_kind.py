@@ -14,7 +14,7 @@ import pytest
 import gaitswarm
 from gaitswarm import JobView
 from gaitswarm.jobs.database import DatabaseJobs
-from gaitswarm.sim.identification.recorded_walk import record
+from gaitswarm.sim.identification import record
 from gaitswarm.sim.measurement.measured_log import simulated_log
 from gaitswarm.sim.measurement.synchronise import synchronise
 from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log

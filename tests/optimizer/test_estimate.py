@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.walk import Walking
 from gaitswarm.sim.robot import RobotVariant
 from gaitswarm.sim.scenario import Scenario

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.sim.calibration.walk import CalibrationWalk
+from gaitswarm.sim.calibration import CalibrationWalk
 from gaitswarm.sim.case import Case, MeasuredWalk, Walk, run_together
 from gaitswarm.sim.kernel.native import NativeKernel
 from gaitswarm.sim.kernel.walk import (

@@ -18,7 +18,7 @@ PROGRAM = """
 import json, sys
 import numpy as np
 from gaitswarm.sim.case import Walk
-from gaitswarm.sim.identification.current_fit import CurrentFit
+from gaitswarm.sim.identification import CurrentFit
 from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import prepare

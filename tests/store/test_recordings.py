@@ -9,7 +9,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.robot import load_robot
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 from tests.store.examples import Clock

@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.jobs.provenance import (
     changes_since,
 )
 from gaitswarm.services.optimizer.jobs.reference import Reference
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import Recordings
 
 DEFAULT_PRIORITY: Final = 0
 

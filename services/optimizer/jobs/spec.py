@@ -36,7 +36,7 @@ from gaitswarm.services.optimizer.search.registry import (
 from gaitswarm.sim.assembly import check_precision
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.sim.identification import RecordedWalk, Recordings
 from gaitswarm.sim.input import Line
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Objective, Outcome

@@ -57,7 +57,7 @@ from gaitswarm.services.optimizer.jobs.spec import Spec, judge_outcomes
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.provenance import Provenance
 

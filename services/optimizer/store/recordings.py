@@ -25,8 +25,8 @@ from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import first_problems, unreadable
 from gaitswarm.services.optimizer.store.tables import recordings
 from gaitswarm.services.optimizer.store.tokens import note_change
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
-from gaitswarm.sim.identification.recorded_walk import Recordings as Walks
+from gaitswarm.sim.identification import RecordedWalk
+from gaitswarm.sim.identification import Recordings as Walks
 
 
 class Recordings(Aggregate):

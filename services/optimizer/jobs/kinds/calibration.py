@@ -21,10 +21,12 @@ from gaitswarm.services.optimizer.jobs.preference import (
     judge,
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec, requested
-from gaitswarm.sim.calibration.targets import QUANTITIES, Target, TargetWalk
-from gaitswarm.sim.calibration.walk import (
+from gaitswarm.sim.calibration import (
+    QUANTITIES,
     RESULTS,
     CalibrationWalk,
+    Target,
+    TargetWalk,
     robot_variables,
     varied_robot,
     walk_variables,
@@ -34,7 +36,7 @@ from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, orders_searched
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.outcome import Objective
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.robot.variant import RobotName

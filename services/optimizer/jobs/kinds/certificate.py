@@ -24,7 +24,7 @@ from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.mujoco.engines import (
     ENGINES,

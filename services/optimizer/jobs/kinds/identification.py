@@ -13,8 +13,7 @@ from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.preference import Judgement
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.case import Case
-from gaitswarm.sim.identification.current_fit import LINK_CURRENTS, CurrentFit
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import LINK_CURRENTS, CurrentFit, Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import Objective
 from gaitswarm.sim.robot import load_robot

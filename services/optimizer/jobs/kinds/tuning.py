@@ -31,7 +31,7 @@ from gaitswarm.sim.case_registry import CASES, CaseFamily, CaseSettings, create_
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
-from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import PluginSettings

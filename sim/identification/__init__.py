@@ -1,1 +1,0 @@
-"""Parameters of a robot from measured walks (thesis 2.4)."""

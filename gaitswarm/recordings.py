@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, NamedTuple
 
@@ -85,18 +86,8 @@ class RecordingEntryView(View):
 
     @classmethod
     def from_entry(cls, entry: RecordingEntry) -> RecordingEntryView:
-        return cls(
-            id=entry.id,
-            created_at=entry.created_at,
-            scenario=entry.scenario,
-            controller=entry.controller,
-            joints=entry.joints,
-            rows=entry.rows,
-            rate=1.0 / CONTROL_PERIOD,
-            seconds=entry.rows * CONTROL_PERIOD,
-            size=entry.size,
-            synthetic=entry.synthetic,
-        )
+        seconds = entry.rows * CONTROL_PERIOD
+        return cls(**asdict(entry), rate=1.0 / CONTROL_PERIOD, seconds=seconds)
 
 
 class SignalView(View):

@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask
-from gaitswarm.services.optimizer.views import Finite, View, finite
+from gaitswarm.services.optimizer.views import DesignValues, Finite, View, finite
 from gaitswarm.sim.assembly import Backend
 from gaitswarm.sim.case import Case, MeasuredWalk
 from gaitswarm.sim.catalogue import design_catalogue, design_numbers, design_shown
@@ -298,9 +298,7 @@ class SimulationView(View):
 
     robot: RobotSource = Field(description="The robot, as requested.", examples=["szabadka2"])
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
-    design: dict[str, float | str] = Field(
-        description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
-    )
+    design: DesignValues
     preference: Preference = Field(description="By which utilities and fitness were computed.")
     precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
     fitness: float | None = Field(

@@ -76,28 +76,7 @@ class PreferenceView(Preference):
 Description = Annotated[
     str, Field(description="What it is, with its source.", examples=["Mamdani fuzzy-PI, chapter 4"])
 ]
-Needs = Annotated[
-    str | None,
-    Field(
-        description="Command that installs what is missing for it here; null if nothing is.",
-        examples=["pip install 'gaitswarm[search]'"],
-    ),
-]
-SettingsSchema = Annotated[
-    dict[str, Any],
-    Field(description="JSON schema of its settings, with defaults, bounds and descriptions."),
-]
 CatalogueName = Annotated[str, Field(description="Name, as in job specs.", examples=["fuzzy-pi"])]
-
-
-class OptimizerView(View):
-    """A search method by its default settings, or a preset of one."""
-
-    name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-falling-inertia"])
-    description: Description
-    needs: Needs
-    settings: ChosenSettings = Field(description="What the name stands for.")
-    settings_schema: SettingsSchema
 
 
 class ControllerView(View):
@@ -126,8 +105,20 @@ class CaseView(View):
 
     name: CatalogueName
     description: Description
-    needs: Needs
-    settings_schema: SettingsSchema
+    needs: str | None = Field(
+        description="Command that installs what is missing for it here; null if nothing is.",
+        examples=["pip install 'gaitswarm[search]'"],
+    )
+    settings_schema: dict[str, Any] = Field(
+        description="JSON schema of its settings, with defaults, bounds and descriptions."
+    )
+
+
+class OptimizerView(CaseView):
+    """A search method by its default settings, or a preset of one."""
+
+    name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-falling-inertia"])
+    settings: ChosenSettings = Field(description="What the name stands for.")
 
 
 class PluginView(View):

@@ -25,16 +25,16 @@ def by_definition(points: np.ndarray) -> np.ndarray:
     rows=st.integers(0, 60),
     objectives=st.integers(1, 6),
     values=st.sampled_from([2, 4, 1000]),
-    leaf=st.sampled_from([1, 4, 100]),
+    block=st.sampled_from([1, 4, 100]),
 )
 @settings(max_examples=200, deadline=None)
 def test_it_is_what_the_definition_says(
-    seed: int, rows: int, objectives: int, values: int, leaf: int
+    seed: int, rows: int, objectives: int, values: int, block: int
 ) -> None:
-    # Few values make many that are equal, and small leaves divide few points.
+    # Few values make many that are equal, and small blocks divide few points.
     points = np.random.default_rng(seed).integers(0, values, (rows, objectives)).astype(np.float64)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(front, "_LEAF", leaf)
+        patch.setattr(front, "_BLOCK", block)
         assert non_dominated(points).tolist() == by_definition(points).tolist()
 
 

@@ -27,8 +27,8 @@ from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIn
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-_LEAF: Final = 1 << 15
-"""Pairs of points compared without further division."""
+_BLOCK: Final = 1024
+"""Points compared at a time."""
 
 
 def non_dominated(points: Floats) -> NDArray[np.bool_]:
@@ -38,72 +38,29 @@ def non_dominated(points: Floats) -> NDArray[np.bool_]:
     not dominate each other. Points that are not finite are never on the front.
     """
     finite = np.isfinite(points).all(axis=1)
-    front = np.zeros(len(points), dtype=np.bool_)
-    if not finite.any():
-        return front
     # Sorted lexicographically: no point is dominated by a later one.
     distinct, inverse = np.unique(points[finite], axis=0, return_inverse=True)
     selected = np.zeros(len(distinct), dtype=np.bool_)
-    selected[_front(distinct, np.arange(len(distinct)))] = True
+    better: list[Floats] = []
+    for first in range(0, len(distinct), _BLOCK):
+        rows = np.arange(first, min(first + _BLOCK, len(distinct)))
+        for block in better:
+            rows = rows[_no_worse(block, distinct[rows]) == 0]
+        # Each is no worse than itself.
+        rows = rows[_no_worse(distinct[rows], distinct[rows]) == 1]
+        selected[rows] = True
+        better.append(distinct[rows])
+    front = np.zeros(len(points), dtype=np.bool_)
     front[finite] = selected[inverse.reshape(-1)]
     return front
 
 
-def _front(points: Floats, rows: Rows) -> Rows:
-    if len(rows) ** 2 <= _LEAF:
-        return rows[~_any_below(points[rows], points[rows], itself=True)]
-    half = len(rows) // 2
-    better, worse = _front(points, rows[:half]), _front(points, rows[half:])
-    # The first objective is already sorted.
-    return np.concatenate([better, _left(points, better, worse, 1)])
-
-
-def _left(points: Floats, judges: Rows, rows: Rows, first: int) -> Rows:
-    """Return the rows, in order, that no judge is as good as in all objectives from `first` on.
-
-    Judges are as good as all rows in the objectives before, and none equals a row in all.
-    """
-    if not len(judges) or not len(rows):
-        return rows
-    objectives = points.shape[1]
-    if first >= objectives:
-        return rows[:0]
-    if first == objectives - 1:
-        best = float(points[judges, first].min())
-        return np.asarray(rows[points[rows, first] < best])
-    if len(judges) * len(rows) <= _LEAF:
-        return rows[~_any_below(points[judges, first:], points[rows, first:])]
-    if first == objectives - 2:
-        return rows[~_swept(points[judges, first:], points[rows, first:])]
-    values, others = points[rows, first], points[judges, first]
-    pivot = np.median(np.concatenate([values, others]))
-    low, judge_low = values < pivot, others < pivot
-    if not (low.any() or judge_low.any()):
-        # Nothing is below the pivot: most equal it.
-        low, judge_low = values <= pivot, others <= pivot
-        if low.all() and judge_low.all():
-            return _left(points, judges, rows, first + 1)
-    good = _left(points, judges[judge_low], rows[low], first)
-    bad = _left(points, judges[judge_low], rows[~low], first + 1)
-    return np.sort(np.concatenate([good, _left(points, judges[~judge_low], bad, first)]))
-
-
-def _any_below(judges: Floats, points: Floats, *, itself: bool = False) -> NDArray[np.bool_]:
-    """(n,): whether any judge, except itself with `itself`, is as good in every objective."""
-    below = np.ones((len(judges), len(points)), dtype=np.bool_)
-    for m in range(points.shape[1]):
-        below &= judges[:, m, None] <= points[None, :, m]
-    if itself:
-        np.fill_diagonal(below, val=False)
-    return np.asarray(below.any(axis=0))
-
-
-def _swept(judges: Floats, points: Floats) -> NDArray[np.bool_]:
-    """As `_any_below`, for two objectives, by sweeping along the first."""
-    order = np.argsort(judges[:, 0], kind="stable")
-    least = np.minimum.accumulate(judges[order, 1])
-    before = np.searchsorted(judges[order, 0], points[:, 0], side="right")
-    return np.asarray((before > 0) & (least[np.maximum(before, 1) - 1] <= points[:, 1]))
+def _no_worse(judges: Floats, points: Floats) -> NDArray[np.intp]:
+    """(n,): how many judges are no worse than each point (n, M) in every objective."""
+    result = np.ones((len(judges), len(points)), dtype=np.bool_)
+    for judge, point in zip(judges.T, points.T, strict=True):
+        result &= judge[:, None] <= point
+    return np.asarray(result.sum(axis=0))
 
 
 MOST_BOUNDS: Final = 250_000

@@ -7,7 +7,7 @@ import weakref
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final
@@ -68,30 +68,6 @@ _LONGEST_WAIT: Final = 10.0
 """Time to wait for memory that other analyses use [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """Dimensions of a row of columns."""
-
-    variables: int
-    cases: int
-    objectives: int
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of a row."""
-        return sum(array.nbytes for array in self.empty(1).arrays)
-
-    def empty(self, rows: int) -> EvaluationColumns:
-        return EvaluationColumns(
-            iteration=np.empty(rows, dtype=np.int64),
-            particle=np.empty(rows, dtype=np.int64),
-            designs=np.empty((rows, self.variables)),
-            objectives=np.empty((rows, self.cases, self.objectives)),
-            statuses=np.empty((rows, self.cases), dtype=np.uint8),
-            fitness=np.empty(rows),
-        )
-
-
 class HistoryMemory:
     """Memory budget of histories, shared by all threads and databases. Thread-safe.
 
@@ -123,10 +99,8 @@ class HistoryMemory:
         key = (id(cache), job.id)
         while True:
             with self._changed:
-                if key not in self._histories:
-                    self._histories[key] = _History(job, self)
+                history = self._histories.setdefault(key, _History(_empty_columns(job)))
                 self._histories.move_to_end(key)
-                history = self._histories[key]
             with history.lock:
                 # It may have been dropped during the wait.
                 if self._histories.get(key) is history:
@@ -139,9 +113,9 @@ class HistoryMemory:
             for key in [key for key in self._histories if key[0] == cache_id]:
                 del self._histories[key]
 
-    def columns(self, rows: int, shape: Shape, *, job_id: str) -> EvaluationColumns:
+    def columns(self, rows: int, like: EvaluationColumns, *, job_id: str) -> EvaluationColumns:
         """Allocate columns, dropping histories that are not being read, and waiting for others."""
-        nbytes = rows * shape.nbytes
+        nbytes = rows * _row_bytes(like)
         with self._changed:
             fits = self._changed.wait_for(
                 lambda: self._used + nbytes <= self.max_bytes or self._make_room(nbytes),
@@ -152,7 +126,7 @@ class HistoryMemory:
                     f"the history of job {job_id} needs {nbytes >> 20} MiB, but others use"
                     f" the {self.max_bytes >> 20} MiB for histories; try again in a few seconds"
                 )
-            made = shape.empty(rows)
+            made = _allocated(rows, like)
             for array in made.arrays:
                 self._used += array.nbytes
                 weakref.finalize(array, self._free, array.nbytes).atexit = False
@@ -181,6 +155,43 @@ MEMORY: Final = HistoryMemory()
 """Shared by the process."""
 
 
+@dataclass(eq=False)
+class _History:
+    """Columns with room to grow: rows are appended in place and never rewritten."""
+
+    room: EvaluationColumns
+    rows: int = 0
+    iterations: int = 0
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def clear(self) -> None:
+        """Drop all rows. Columns that were returned remain valid."""
+        self.iterations = self.rows = 0
+        self.room = _allocated(0, self.room)
+
+
+def _empty_columns(job: Job) -> EvaluationColumns:
+    spec = job.spec
+    cases = len(spec.case_names)
+    return EvaluationColumns(
+        iteration=np.empty(0, dtype=np.int64),
+        particle=np.empty(0, dtype=np.int64),
+        designs=np.empty((0, len(spec.design_space().names))),
+        objectives=np.empty((0, cases, len(spec.objectives))),
+        statuses=np.empty((0, cases), dtype=np.uint8),
+        fitness=np.empty(0),
+    )
+
+
+def _allocated(rows: int, like: EvaluationColumns) -> EvaluationColumns:
+    arrays = (np.empty((rows, *array.shape[1:]), dtype=array.dtype) for array in like.arrays)
+    return EvaluationColumns(*arrays)
+
+
+def _row_bytes(columns: EvaluationColumns) -> int:
+    return sum(array.nbytes for array in _allocated(1, columns).arrays)
+
+
 class HistoryCache:
     """Columns of a store's recently used jobs. Thread-safe."""
 
@@ -190,79 +201,50 @@ class HistoryCache:
         weakref.finalize(self, memory.forget, id(self)).atexit = False
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Return the evaluations of a job's committed iterations."""
+        """Return the evaluations of a job's committed iterations, as read-only views."""
         with self._memory.history(self, job) as history:
-            history.reserve(job.progress.evaluations)
+            self._reserve(history, job, job.progress.evaluations)
             while history.iterations < job.progress.iterations:
                 self._read_on(history, job)
-            return history.columns()
+            views = history.room.rows(slice(history.rows))
+        for array in views.arrays:
+            array.flags.writeable = False
+        return views
 
     def _read_on(self, history: _History, job: Job) -> None:
         first = history.iterations
         last = min(first + iterations_of(PIECE, job), job.progress.iterations)
         piece = self._store.evaluation_columns(job.id, first, last)
         if piece is not None:
-            history.append(piece)
+            rows = history.rows + len(piece)
+            self._reserve(history, job, rows)
+            for room, new in zip(history.room.arrays, piece.arrays, strict=True):
+                room[history.rows : rows] = new
+            history.rows = rows
         history.iterations = last
 
-
-class _History:
-    """Columns with room to grow: rows are appended in place and never rewritten."""
-
-    def __init__(self, job: Job, memory: HistoryMemory) -> None:
-        spec = job.spec
-        cases, objectives = len(spec.case_names), len(spec.objectives)
-        self.lock = threading.Lock()
-        self.iterations = 0
-        self._job_id = job.id
-        self._memory = memory
-        self._shape = Shape(len(spec.design_space().names), cases, objectives)
-        self._length = 0
-        self._room = self._empty(0)
-
-    def clear(self) -> None:
-        """Drop all rows. Columns that were returned remain valid."""
-        self.iterations = self._length = 0
-        self._room = self._empty(0)
-
-    def reserve(self, rows: int) -> None:
+    def _reserve(self, history: _History, job: Job, rows: int) -> None:
         """Make room for `rows` rows in total. Columns that were returned remain valid.
 
         Without room for a larger copy, all rows are dropped and read again. Raises Conflict if they
         can never fit, and EvaluatorUnavailable if others use the memory.
         """
-        if rows <= len(self._room):
+        present = len(history.room)
+        if rows <= present:
             return
-        most = self._memory.max_bytes // self._shape.nbytes
+        most = self._memory.max_bytes // _row_bytes(history.room)
         if rows > most:
             raise Conflict(
-                f"job {self._job_id} has {rows} evaluations, more than fit into the"
+                f"job {job.id} has {rows} evaluations, more than fit into the"
                 f" {self._memory.max_bytes >> 20} MiB for histories; export it and analyze the file"
                 " instead"
             )
-        room = max(rows, len(self._room) + len(self._room) // 2)
-        if len(self._room) + room > most:
+        room = max(rows, present + present // 2)
+        if present + room > most:
             room = rows
-        if len(self._room) + room > most:
-            self.clear()
-        larger = self._empty(room)
-        for new, old in zip(larger.arrays, self._room.arrays, strict=True):
-            new[: self._length] = old[: self._length]
-        self._room = larger
-
-    def append(self, rows: EvaluationColumns) -> None:
-        needed = self._length + len(rows)
-        self.reserve(needed)
-        for room, new in zip(self._room.arrays, rows.arrays, strict=True):
-            room[self._length : needed] = new
-        self._length = needed
-
-    def columns(self) -> EvaluationColumns:
-        """Return the rows read so far, as read-only views."""
-        views = self._room.rows(slice(self._length))
-        for array in views.arrays:
-            array.flags.writeable = False
-        return views
-
-    def _empty(self, rows: int) -> EvaluationColumns:
-        return self._memory.columns(rows, self._shape, job_id=self._job_id)
+        if present + room > most:
+            history.clear()
+        larger = self._memory.columns(room, history.room, job_id=job.id)
+        for new, old in zip(larger.arrays, history.room.arrays, strict=True):
+            new[: history.rows] = old[: history.rows]
+        history.room = larger

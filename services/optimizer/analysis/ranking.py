@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.distribution import iteration_starts
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
 from gaitswarm.services.optimizer.analysis.statistics import rank_correlation
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, evaluations_of
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View
@@ -72,20 +75,14 @@ def rank(columns: EvaluationColumns, spec: JobSpec, request: RankingRequest) -> 
     """Rank all designs by their stored objectives."""
     preference = request.resolved_preference()
     fitness, before = fitness_by(columns, preference, worlds=spec.worlds), columns.fitness
-    present, ordered = _best_first(before, 1), np.sort(before)
-    rows = _best_first(fitness, request.top).tolist()
-    evaluations = [
-        Evaluation(
-            iteration=int(columns.iteration[row]),
-            particle=int(columns.particle[row]),
-            design=columns.designs[row],
-            objectives=columns.objectives[row],
-            statuses=columns.statuses[row],
-            fitness=float(fitness[row]),
-        )
-        for row in rows
-    ]
-    views = evaluation_views(evaluations, spec.model_copy(update={"preference": preference}))
+    present = _best_first(before)
+    ranks = {row: rank for rank, row in enumerate(present.tolist(), start=1)}
+    rows = _best_first(fitness)[: request.top]
+    top = evaluations_of(replace(columns, fitness=fitness).rows(rows))
+    views = evaluation_views(top, spec.model_copy(update={"preference": preference}))
+    starts = iteration_starts(columns)
+    least = np.minimum.reduceat(fitness, starts) if len(starts) else fitness
+    best_so_far = np.minimum.accumulate(least).tolist()
     return RankingView(
         preference=request.preference,
         evaluations=len(columns),
@@ -96,43 +93,19 @@ def rank(columns: EvaluationColumns, spec: JobSpec, request: RankingRequest) -> 
                 {
                     **dict(view),
                     "rank": place,
-                    "rank_before": _place(row, before, ordered),
+                    "rank_before": ranks.get(row),
                     "fitness_before": before[row],
                 }
             )
-            for place, (row, view) in enumerate(zip(rows, views, strict=True), start=1)
+            for place, (row, view) in enumerate(zip(rows.tolist(), views, strict=True), start=1)
         ],
         best_so_far=[
-            BestSoFarView(index=index, fitness=value)
-            for index, value in enumerate(best_so_far(columns.iteration, fitness).tolist())
+            BestSoFarView(index=index, fitness=value) for index, value in enumerate(best_so_far)
         ],
     )
 
 
-def best_so_far(iteration: NDArray[np.int64], fitness: Floats) -> Floats:
-    """Return the least fitness up to each distinct iteration.
-
-    iteration: (r,) ascending. fitness: (r,), +inf for a failed design.
-    """
-    if not len(iteration):
-        return np.empty(0)
-    starts = np.flatnonzero(np.diff(iteration, prepend=-1))
-    return np.minimum.accumulate(np.minimum.reduceat(fitness, starts))
-
-
-def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
-    """Rows of the least finite fitness, best first; ties by age."""
-    rows = np.flatnonzero(np.isfinite(fitness))
-    if len(rows) > most:
-        # Sorting all of them would take longer than judging them.
-        worst = np.partition(fitness[rows], most - 1)[most - 1]
-        rows = rows[fitness[rows] <= worst]
-    return rows[np.argsort(fitness[rows], kind="stable")][:most]
-
-
-def _place(row: int, fitness: Floats, ordered: Floats) -> int | None:
-    """Rank of a row among finite fitness, from 1; ties by age."""
-    value = fitness[row]
-    if not np.isfinite(value):
-        return None
-    return int(np.searchsorted(ordered, value) + np.count_nonzero(fitness[:row] == value)) + 1
+def _best_first(fitness: Floats) -> NDArray[np.intp]:
+    """Rows of finite fitness, best first; ties by age."""
+    order = np.argsort(fitness, kind="stable")
+    return order[np.isfinite(fitness[order])]

@@ -37,9 +37,7 @@ _RESAMPLED_ROWS: Final = 4_000_000
 """Of all resamples together: longer histories have fewer resamples."""
 
 _FOREMOST: Final = 64
-"""Rows among which a resample's winner is first looked for: a resample contains each of them with a
-probability of two thirds.
-"""
+"""Best rows among which all winners are, as a rule: a resample has each with a chance of 2/3."""
 
 _MOST_FAMILIES: Final = 64
 """Limit on the families of one size; beyond it, they are sampled."""
@@ -228,23 +226,11 @@ def _median(values: Sequence[float]) -> float:
 
 def _winners(fitness: Floats, drawn: NDArray[np.bool_]) -> NDArray[np.intp]:
     """(1 + B,) row of the least fitness (r,) in each sample; ties by age."""
-    winners = np.empty(len(drawn), dtype=np.intp)
-    left, most = np.arange(len(drawn)), _FOREMOST
-    while len(left):
-        order = _best_first(fitness, most)
-        held = drawn[np.ix_(left, order)]
-        found = held.any(axis=1)
-        winners[left[found]] = order[held[found].argmax(axis=1)]
-        left, most = left[~found], 8 * most
-    return winners
-
-
-def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
-    """The `most` rows of least fitness (r,), and all ties with the last of them, in order."""
-    if most >= len(fitness):
-        return np.argsort(fitness, kind="stable")
-    rows = np.flatnonzero(fitness <= np.partition(fitness, most - 1)[most - 1])
-    return rows[np.argsort(fitness[rows], kind="stable")]
+    order = np.argsort(fitness, kind="stable")
+    foremost = order[:_FOREMOST]
+    if not drawn[:, foremost].any(axis=1).all():
+        foremost = order
+    return np.asarray(foremost[drawn[:, foremost].argmax(axis=1)])
 
 
 def _loss(own: Floats, best: Floats) -> Interval:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from dataclasses import replace
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import (
+    Evaluation,
+    EvaluationColumns,
+    evaluations_of,
+)
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View
 from gaitswarm.sim.outcome import Status
@@ -65,6 +70,9 @@ class TargetsView(View):
     targets: list[TargetResultView] = Field(description="Every target, in the job's order.")
 
 
+_TARGET: Final = ("walk", "relative_to", "quantity", "unit", "value", "tolerance", "use")
+
+
 def target_results(
     job_ids: Sequence[str],
     spec: CalibrationSpec,
@@ -80,7 +88,7 @@ def target_results(
     """
     simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
     differences = spec.differences(simulated)
-    best = _best_of_all(runs) if bests is None else _best_in_double(bests)
+    run, best = _best_of_all(runs) if bests is None else _best_in_double(bests)
     of_best = spec.simulated(best.objectives[None], (best.statuses != Status.OK)[None])
     off = spec.differences(of_best)
     results = []
@@ -98,19 +106,13 @@ def target_results(
             TargetResultView(
                 simulated=of_best[0, index],
                 difference=off[0, index],
-                walk=target.walk,
-                relative_to=target.relative_to,
-                quantity=target.quantity,
-                unit=target.unit,
-                value=target.value,
-                tolerance=target.tolerance,
-                use=target.use,
+                **{name: getattr(target, name) for name in _TARGET},
                 left_out=left_out,
             )
         )
     return TargetsView(
         jobs=list(job_ids),
-        job=job_ids[best.run],
+        job=job_ids[run],
         iteration=best.iteration,
         particle=best.particle,
         fitness=best.fitness,
@@ -119,40 +121,19 @@ def target_results(
     )
 
 
-class _Best(NamedTuple):
-    """The best design of all runs; see `Evaluation`."""
-
-    run: int
-    iteration: int
-    particle: int
-    design: Floats
-    objectives: Floats
-    statuses: NDArray[np.uint8]
-    fitness: float
-
-
-def _best_of_all(runs: Sequence[EvaluationColumns]) -> _Best:
+def _best_of_all(runs: Sequence[EvaluationColumns]) -> tuple[int, Evaluation]:
+    """Return the run of the best design, and its evaluation."""
     run = int(np.argmin([columns.fitness.min(initial=math.inf) for columns in runs]))
-    columns = runs[run]
-    row = int(np.argmin(columns.fitness))
-    return _Best(
-        run,
-        int(columns.iteration[row]),
-        int(columns.particle[row]),
-        columns.designs[row],
-        columns.objectives[row],
-        columns.statuses[row],
-        float(columns.fitness[row]),
-    )
+    (best,) = evaluations_of(runs[run].rows(np.array([runs[run].fitness.argmin()])))
+    return run, best
 
 
-def _best_in_double(bests: Sequence[Evaluation]) -> _Best:
+def _best_in_double(bests: Sequence[Evaluation]) -> tuple[int, Evaluation]:
     reevaluations = [best.reevaluation for best in bests]
     judged = [(a.fitness, run, a) for run, a in enumerate(reevaluations) if a is not None]
     fitness, run, result = min(judged, key=lambda entry: entry[:2])
-    best = bests[run]
-    place = (run, best.iteration, best.particle)
-    return _Best(*place, best.design, result.objectives, result.statuses, fitness)
+    objectives, statuses = result.objectives, result.statuses
+    return run, replace(bests[run], objectives=objectives, statuses=statuses, fitness=fitness)
 
 
 def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut | None) -> NDArray[np.bool_]:

@@ -89,6 +89,12 @@ class Evaluation:
     reevaluation: Reevaluation | None = None
 
 
+def evaluations_of(columns: EvaluationColumns) -> tuple[Evaluation, ...]:
+    rows = (columns.designs, columns.objectives, columns.statuses, columns.fitness.tolist())
+    places = (columns.iteration.tolist(), columns.particle.tolist())
+    return tuple(Evaluation(*row) for row in zip(*places, *rows, strict=True))
+
+
 @dataclass(frozen=True, slots=True)
 class Iteration:
     """A committed iteration as listed, without its designs."""

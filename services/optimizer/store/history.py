@@ -52,6 +52,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     JournalEntry,
     Reevaluation,
     best_particle,
+    evaluations_of,
     fitness_summary,
 )
 from gaitswarm.services.optimizer.jobs.listing import Page, checked_limit
@@ -141,7 +142,7 @@ class History(Aggregate):
     def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
         """Return all designs of a range of iterations, by iteration and particle."""
         columns = self.evaluation_columns(job_id, first, last)
-        return () if columns is None else _evaluations(columns)
+        return () if columns is None else evaluations_of(columns)
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
         """Return the designs of `evaluations_between` as columns; None if there are none."""
@@ -164,7 +165,7 @@ class History(Aggregate):
                 return None
             columns = _select_columns(connection, job_id, iteration, iteration + 1)
             again = _select_reevaluations(connection, job_id, iteration, iteration + 1)
-        best = None if columns is None else _evaluations(columns)[particle]
+        best = None if columns is None else evaluations_of(columns)[particle]
         return best and replace(best, reevaluation=again[0][1] if again else None)
 
     def reevaluations(
@@ -300,12 +301,6 @@ def _select_links(connection: Connection, job_id: str, first: int, last: int) ->
         )
         for row in rows
     )
-
-
-def _evaluations(columns: EvaluationColumns) -> tuple[Evaluation, ...]:
-    rows = (columns.designs, columns.objectives, columns.statuses, columns.fitness.tolist())
-    places = (columns.iteration.tolist(), columns.particle.tolist())
-    return tuple(Evaluation(*row) for row in zip(*places, *rows, strict=True))
 
 
 def _result_columns(

@@ -32,7 +32,6 @@ from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.provenance import installed_version
-from gaitswarm.services.optimizer.store import Observer
 from gaitswarm.sim.outcome import Status
 
 if TYPE_CHECKING:
@@ -236,7 +235,7 @@ _REMEMBERED_LOSSES: Final = 256
 """Lost leases remembered, so that each is counted once."""
 
 
-class StoreMetrics(Observer):
+class StoreMetrics:
     """Measures what this process does with a store."""
 
     def __init__(self, metrics: Metrics) -> None:

@@ -18,9 +18,8 @@ from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
 
 from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
-from gaitswarm.services.optimizer.jobs.job import Claim, JobState
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask, TaskReport
-from gaitswarm.services.optimizer.store import Observer
 
 
 def exporting_tracing() -> Tracing:
@@ -33,7 +32,7 @@ def exporting_tracing() -> Tracing:
     return Tracing(BatchSpanProcessor(OTLPSpanExporter()))
 
 
-class Tracing(Observer):
+class Tracing:
     """Spans of the jobs run by this process, which it observes at the store. Thread-safe.
 
     A job's span is from its claim to its release or end; an iteration's from its evaluation to its
@@ -59,6 +58,12 @@ class Tracing(Observer):
     def close(self) -> None:
         """Export pending spans. Idempotent."""
         self._provider.shutdown()
+
+    def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:
+        """Make no span of it."""
+
+    def cancelled(self, job: Job) -> None:
+        """Make no span of a job that has none."""
 
     def claimed(self, claim: Claim) -> None:
         job = claim.job

@@ -34,7 +34,7 @@ class Waiting(JobService):
         return super().columns(job)
 
 
-@pytest.mark.parametrize("question", ["distribution", "front", "evidence"])
+@pytest.mark.parametrize("question", ["distribution", "front", "importance"])
 def test_analyses_wait_for_capacity_and_are_rejected_when_the_queue_is_full(
     serve: Serve, service: JobService, job: Job, commit: Commit, question: str
 ) -> None:

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, closing, contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import sqlalchemy as sa
 from sqlalchemy.exc import (
@@ -93,7 +93,7 @@ def parse_url(text: str) -> sa.URL:
     return sa.URL.create("sqlite+pysqlite", database=str(Path(str(url.database)).expanduser()))
 
 
-class Observer:
+class Observer(Protocol):
     """Receives what a process does with a database, for metrics and traces.
 
     Methods are called after the transaction, in its thread; they return at once.

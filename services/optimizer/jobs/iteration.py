@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
 from typing import Any, Final
 
@@ -37,14 +37,7 @@ class EvaluationColumns:
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """All columns, in the order of the constructor."""
-        return (
-            self.iteration,
-            self.particle,
-            self.designs,
-            self.objectives,
-            self.statuses,
-            self.fitness,
-        )
+        return tuple(getattr(self, column.name) for column in fields(self))
 
     @property
     def failed(self) -> NDArray[np.bool_]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Final
 
@@ -86,37 +85,16 @@ class JobFilter:
 ANY_JOB: Final = JobFilter()
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class FacetCounts:
-    """Number of jobs by value of each facet."""
+    """Number of jobs by value of each facet; jobs without a value are not counted."""
 
-    total: int = 0
-    states: Counter[str] = field(default_factory=Counter)
-    robots: Counter[str] = field(default_factory=Counter)
-    controllers: Counter[str] = field(default_factory=Counter)
-    preferences: Counter[str] = field(default_factory=Counter)
-    tags: Counter[str] = field(default_factory=Counter)
-
-    def add(
-        self,
-        state: str,
-        robot: str | None,
-        controller: str | None,
-        preference: str | None,
-        *,
-        tags: Iterable[str],
-    ) -> None:
-        """Count a job; a robot without a name, and a job without a preference, have None."""
-        self.total += 1
-        self.states[state] += 1
-        for counter, value in (
-            (self.robots, robot),
-            (self.controllers, controller),
-            (self.preferences, preference),
-        ):
-            if value is not None:
-                counter[value] += 1
-        self.tags.update(tags)
+    total: int
+    states: Counter[str]
+    robots: Counter[str]
+    controllers: Counter[str]
+    preferences: Counter[str]
+    tags: Counter[str]
 
 
 def robot_name(robot: RobotSource | None) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
@@ -31,11 +31,17 @@ class Judgement:
     def utilities(self) -> Floats:
         """(n, K), +inf if the case failed or on overflow."""
         flat = self.log_utilities.reshape(-1)
-        utilities = np.empty(len(flat))
-        for begin in range(0, len(flat), _PIECE):
-            piece = slice(begin, begin + _PIECE)
-            utilities[piece] = [exponential(u) for u in flat[piece].tolist()]
+        utilities = _by_pieces(len(flat), lambda piece: map(exponential, flat[piece].tolist()))
         return utilities.reshape(self.log_utilities.shape)
+
+
+def _by_pieces(count: int, compute: Callable[[slice], Iterable[float]]) -> Floats:
+    """Compute (count,) values piece by piece."""
+    values = np.empty(count)
+    for begin in range(0, count, _PIECE):
+        piece = slice(begin, begin + _PIECE)
+        values[piece] = list(compute(piece))
+    return values
 
 
 def exponential(logarithm: float) -> float:
@@ -155,26 +161,22 @@ def log_utilities(
 ) -> NDArray[np.float64]:
     """Logarithm of the bias-weighted product (eq. 3.8, 4.1)."""
     flat, lost = objectives.reshape(-1, objectives.shape[-1]), failed.reshape(-1)
-    values = np.empty(len(flat))
-    for begin in range(0, len(flat), _PIECE):
-        piece = slice(begin, begin + _PIECE)
-        values[piece] = [
-            math.inf if bad else _log_product(row, preference)
-            for row, bad in zip(flat[piece].tolist(), lost[piece].tolist(), strict=True)
-        ]
-    return values.reshape(failed.shape)
+
+    def compute(piece: slice) -> Iterator[float]:
+        for row, bad in zip(flat[piece].tolist(), lost[piece].tolist(), strict=True):
+            yield math.inf if bad else _log_product(row, preference)
+
+    return _by_pieces(len(flat), compute).reshape(failed.shape)
 
 
 def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
     """Geometric mean over scenarios (eq. 4.2)."""
-    fitness = np.empty(len(log_utility))
-    for begin in range(0, len(log_utility), _PIECE):
-        piece = slice(begin, begin + _PIECE)
-        fitness[piece] = [
-            math.inf if math.inf in row else exponential(math.fsum(row) / len(row))
-            for row in log_utility[piece].tolist()
-        ]
-    return fitness
+
+    def compute(piece: slice) -> Iterator[float]:
+        for row in log_utility[piece].tolist():
+            yield math.inf if math.inf in row else exponential(math.fsum(row) / len(row))
+
+    return _by_pieces(len(log_utility), compute)
 
 
 def objective_vectors(

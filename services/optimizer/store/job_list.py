@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -105,14 +106,15 @@ class JobList(Aggregate):
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by facet."""
-        counts = FacetCounts()
-        table = jobs.c
-        columns = (table.state, table.robot, table.controller, table.preference, table.tags)
-        query = select(*columns).where(*_conditions(JobFilter(archived=archived)))
+        names = ("state", "robot", "controller", "preference")
+        query = select(*(jobs.c[name] for name in names), jobs.c.tags)
         with self._database.read("facets") as connection:
-            for *values, tags in connection.execute(query):
-                counts.add(*values, tags=(tags or "").split("\n")[1:-1])
-        return counts
+            rows = connection.execute(query.where(*_conditions(JobFilter(archived=archived)))).all()
+        states, robots, controllers, preferences = (
+            Counter(v for row in rows if (v := row[k]) is not None) for k in range(4)
+        )
+        tags = Counter(tag for row in rows for tag in (row.tags or "").split("\n")[1:-1])
+        return FacetCounts(len(rows), states, robots, controllers, preferences, tags)
 
     def queue(self) -> Queue:
         """Count jobs by state and kind. Ended jobs are not read, as there may be very many."""

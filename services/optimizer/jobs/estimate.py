@@ -59,12 +59,22 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
     Rates refer to the time spent evaluating; pauses and time in the queue do not count.
     """
     progress = job.progress
-    no_rate = job.own_evaluations == 0 or progress.compute_seconds <= 0.0
-    eta, basis = _without_pace(job, no_rate=no_rate)
-    if no_rate:
-        return TimeLeft(eta, None, None, basis)
-    if not basis:
+    rated = job.own_evaluations > 0 and progress.compute_seconds > 0.0
+    eta: float | None = None
+    if job.state is JobState.SUCCEEDED:
+        eta, basis = 0.0, "the job has ended"
+    elif job.state is not JobState.RUNNING:
+        basis = f"unknown: the job is {job.state}"
+    elif job.waiting is not None:
+        basis = "unknown while the job waits"
+    elif not job.readable:
+        basis = "unknown: the job's spec cannot be read"
+    elif not rated:
+        basis = "unknown until the first iteration is committed"
+    else:
         eta, basis = _by_pace(job, now)
+    if not rated:
+        return TimeLeft(eta, None, None, basis)
     walked = progress.evaluations_walked / progress.compute_seconds
     return TimeLeft(
         eta,
@@ -72,21 +82,6 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
         walked * len(job.spec.case_names) if job.readable else None,
         basis,
     )
-
-
-def _without_pace(job: Job, *, no_rate: bool) -> tuple[float | None, str]:
-    """Return what is known without a pace, and the basis; an empty basis if a pace suffices."""
-    if job.state is JobState.SUCCEEDED:
-        return 0.0, "the job has ended"
-    if job.state is not JobState.RUNNING:
-        return None, f"unknown: the job is {job.state}"
-    if job.waiting is not None:
-        return None, "unknown while the job waits"
-    if not job.readable:
-        return None, "unknown: the job's spec cannot be read"
-    if no_rate:
-        return None, "unknown until the first iteration is committed"
-    return None, ""
 
 
 def _by_pace(job: Job, now: datetime) -> tuple[float, str]:

@@ -95,10 +95,10 @@ _DELETED: Final = sa.text("deleted_at IS NOT NULL")
 jobs: Final = sa.Table(
     "jobs",
     metadata,
-    sa.Column("id", sa.Text, nullable=False),
+    sa.Column("id", sa.Text, primary_key=True),
     sa.Column("state", sa.Text, nullable=False),
     sa.Column("spec", Document, nullable=False),
-    sa.Column("idempotency_key", sa.Text),
+    sa.Column("idempotency_key", sa.Text, unique=True),
     sa.Column("created_at", UtcDateTime, nullable=False),
     sa.Column("updated_at", UtcDateTime, nullable=False),
     sa.Column("started_at", UtcDateTime),
@@ -127,7 +127,7 @@ jobs: Final = sa.Table(
     sa.Column("evaluations_saved", sa.BigInteger, nullable=False, server_default="0"),
     sa.Column("evaluations_taken", sa.BigInteger, nullable=False, server_default="0"),
     # Of a fork; no foreign key, as a fork outlives its parent.
-    sa.Column("parent_id", sa.Text),
+    sa.Column("parent_id", sa.Text, index=True),
     sa.Column("lineage", Document(none_as_null=True)),
     # Name of the token it was submitted with; NULL for none.
     sa.Column("owner", sa.Text),
@@ -165,11 +165,8 @@ jobs: Final = sa.Table(
     sa.Column("search_text", sa.Text),
     # Where the last iteration was simulated; NULL if unknown.
     sa.Column("evaluated_on", sa.Text),
-    sa.PrimaryKeyConstraint("id"),
-    sa.UniqueConstraint("idempotency_key"),
     sa.Index(None, "created_at", "id"),
     sa.Index(None, "state", "created_at", "id"),
-    sa.Index(None, "parent_id"),
     # Of deleted jobs only: SQLite would use a full index to find all others, and sort these.
     sa.Index(None, "deleted_at", sqlite_where=_DELETED, postgresql_where=_DELETED),
     sa.Index(None, "best_fitness", "id"),
@@ -191,8 +188,8 @@ EXISTING: Final = jobs.c.deleted_at.is_(None)
 iterations: Final = sa.Table(
     "iterations",
     metadata,
-    sa.Column("job_id", sa.Text, nullable=False),
-    sa.Column("iteration", sa.Integer, nullable=False),
+    sa.Column("job_id", sa.ForeignKey("jobs.id"), primary_key=True),
+    sa.Column("iteration", sa.Integer, primary_key=True),
     # The ask: (particles, d) positions and the optimizer's state, {} once a later iteration is
     # committed.
     sa.Column("positions", Document, nullable=False),
@@ -207,39 +204,34 @@ iterations: Final = sa.Table(
     # Of positions and state, and of the committed iteration, chained to the previous one.
     sa.Column("ask_digest", sa.Text),
     sa.Column("digest", sa.Text),
-    sa.PrimaryKeyConstraint("job_id", "iteration"),
-    sa.ForeignKeyConstraint(["job_id"], ["jobs.id"]),
 )
 
 evaluations: Final = sa.Table(
     "evaluations",
     metadata,
-    sa.Column("job_id", sa.Text, nullable=False),
-    sa.Column("iteration", sa.Integer, nullable=False),
-    sa.Column("particle", sa.Integer, nullable=False),
+    sa.Column("job_id", sa.Text, primary_key=True),
+    sa.Column("iteration", sa.Integer, primary_key=True),
+    sa.Column("particle", sa.Integer, primary_key=True),
     # (v,) numbers; (K, m) numbers, null for NaN; (K,) labels; a fitness of +inf is NULL.
     sa.Column("design", sa.JSON, nullable=False),
     sa.Column("objectives", sa.JSON, nullable=False),
     sa.Column("statuses", sa.JSON, nullable=False),
     sa.Column("fitness", sa.Double),
     # Key of the simulated design; NULL if the outcome was cached.
-    sa.Column("walk_key", sa.LargeBinary),
-    sa.PrimaryKeyConstraint("job_id", "iteration", "particle"),
+    sa.Column("walk_key", sa.LargeBinary, index=True),
     sa.ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
-    sa.Index(None, "walk_key"),
 )
 
 # Best designs of searches in single precision, evaluated again in double.
 reevaluations: Final = sa.Table(
     "reevaluations",
     metadata,
-    sa.Column("job_id", sa.Text, nullable=False),
-    sa.Column("iteration", sa.Integer, nullable=False),
-    sa.Column("particle", sa.Integer, nullable=False),
+    sa.Column("job_id", sa.Text, primary_key=True),
+    sa.Column("iteration", sa.Integer, primary_key=True),
+    sa.Column("particle", sa.Integer, primary_key=True),
     sa.Column("objectives", sa.JSON, nullable=False),
     sa.Column("statuses", sa.JSON, nullable=False),
     sa.Column("fitness", sa.Double),
-    sa.PrimaryKeyConstraint("job_id", "iteration", "particle"),
     sa.ForeignKeyConstraint(
         ["job_id", "iteration", "particle"],
         ["evaluations.job_id", "evaluations.iteration", "evaluations.particle"],
@@ -250,57 +242,51 @@ reevaluations: Final = sa.Table(
 journal: Final = sa.Table(
     "journal",
     metadata,
-    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), autoincrement=True),
-    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
+    sa.Column("job_id", sa.Text, nullable=False, index=True),
     sa.Column("iteration", sa.Integer, nullable=False),
     sa.Column("case_index", sa.Integer, nullable=False),
     # n keys of designs; (n, m) float64, little-endian; n statuses.
     sa.Column("keys", sa.LargeBinary, nullable=False),
     sa.Column("objectives", sa.LargeBinary, nullable=False),
     sa.Column("statuses", sa.LargeBinary, nullable=False),
-    sa.PrimaryKeyConstraint("id"),
     sa.ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
-    sa.Index(None, "job_id"),
 )
 
 recordings: Final = sa.Table(
     "recordings",
     metadata,
     # Digest of the content.
-    sa.Column("id", sa.Text, nullable=False),
+    sa.Column("id", sa.Text, primary_key=True),
     sa.Column("document", Document, nullable=False),
     sa.Column("created_at", UtcDateTime, nullable=False),
     # What a list shows of it; see `RecordingEntry`.
     *(sa.Column(n, sa.Text, nullable=False) for n in ("scenario", "controller")),
     *(sa.Column(n, sa.Integer, nullable=False) for n in ("size", "joints", "rows")),
     sa.Column("synthetic", sa.Boolean, nullable=False),
-    sa.PrimaryKeyConstraint("id"),
 )
 
 tokens: Final = sa.Table(
     "tokens",
     metadata,
-    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("name", sa.Text, primary_key=True),
     sa.Column("scope", sa.Text, nullable=False),
     # Of the secret, which is not stored.
-    sa.Column("digest", sa.Text, nullable=False),
+    sa.Column("digest", sa.Text, nullable=False, unique=True),
     sa.Column("created_at", UtcDateTime, nullable=False),
     sa.Column("revoked_at", UtcDateTime),
-    sa.PrimaryKeyConstraint("name"),
-    sa.UniqueConstraint("digest"),
 )
 
 audit: Final = sa.Table(
     "audit",
     metadata,
-    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), autoincrement=True),
+    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
     sa.Column("at", UtcDateTime, nullable=False),
     sa.Column("actor", sa.Text, nullable=False),
     sa.Column("action", sa.Text, nullable=False),
     # No foreign key: entries outlive their job.
     sa.Column("job_id", sa.Text),
     sa.Column("details", sa.JSON, nullable=False),
-    sa.PrimaryKeyConstraint("id"),
     sa.Index(None, "job_id", "id"),
     # An id is never reused.
     sqlite_autoincrement=True,
@@ -309,18 +295,15 @@ audit: Final = sa.Table(
 notifications: Final = sa.Table(
     "notifications",
     metadata,
-    sa.Column("id", sa.Text, nullable=False),
+    sa.Column("id", sa.Text, primary_key=True),
     # No foreign key: a notification outlives its job.
-    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("job_id", sa.Text, nullable=False, index=True),
     sa.Column("url", sa.Text, nullable=False),
     sa.Column("document", sa.JSON, nullable=False),
     sa.Column("created_at", UtcDateTime, nullable=False),
     sa.Column("attempts", sa.Integer, nullable=False),
     # NULL once delivered or given up.
-    sa.Column("next_attempt_at", UtcDateTime),
+    sa.Column("next_attempt_at", UtcDateTime, index=True),
     sa.Column("delivered_at", UtcDateTime),
     sa.Column("error", sa.Text),
-    sa.PrimaryKeyConstraint("id"),
-    sa.Index(None, "next_attempt_at"),
-    sa.Index(None, "job_id"),
 )

@@ -154,7 +154,7 @@ def test_integers_that_are_too_narrow_do_not_compile(tmp_path: Path) -> None:
 def test_firmware_compiles_for_any_label(tmp_path: Path) -> None:
     folder = tmp_path / "firmware"
     gait = short_walk(cycle_time=0.5, stride=0.04)
-    label = "*/ #error /* $P ${I} \\\n */*/ \u00fc"
+    label = "*/ #error /* $P ${I} */*/ \u00fc \\"
     write_firmware({"P": 0.25, "I": 0.0}, folder, controller="pi", scenarios=gait, label=label)
     tested = make(folder, "test")
     assert tested.code == 0, tested.out + tested.err

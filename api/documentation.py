@@ -15,7 +15,7 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from gaitswarm.api.middleware import security_policy
 from gaitswarm.api.problems import MEDIA_TYPE
 from gaitswarm.replay import ReplayHeaderView
-from gaitswarm.services.optimizer.analysis.particles import ParticlesHeaderView
+from gaitswarm.services.optimizer.analysis.distribution import ParticlesHeaderView
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.views.base import ProblemView
 

@@ -36,9 +36,8 @@ from gaitswarm.recordings import (
 from gaitswarm.robots import RobotCheckView, RobotDraftRequest, RobotDraftView, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView, convergence
-from gaitswarm.services.optimizer.analysis.distribution import DistributionView
+from gaitswarm.services.optimizer.analysis.distribution import DistributionView, encoded_particles
 from gaitswarm.services.optimizer.analysis.distribution import distribution as spread
-from gaitswarm.services.optimizer.analysis.particles import encoded_particles
 from gaitswarm.services.optimizer.analysis.reference import (
     JobReferenceView,
     ReferenceView,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Final
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.analysis.history import PIECE, iterations_of
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
@@ -30,9 +32,6 @@ from gaitswarm.services.optimizer.jobs.listing import every
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
-
-_PIECE: Final = 2000
-"""Evaluations per transaction."""
 
 _ROUNDING: Final = 1e-12
 """Relative tolerance for means computed in another order on another processor."""
@@ -184,25 +183,22 @@ class _Piece:
 def _stored(store: Store, job: Job) -> Iterator[Stored]:
     """Yield a job's committed iterations, in order. Raises BrokenChain."""
     end = job.progress.iterations
-    step = max(1, _PIECE * end // max(1, job.progress.evaluations))
+    step = iterations_of(PIECE, job)
     for first in range(0, end, step):
-        last = min(first + step, end)
-        try:
-            piece = _Piece.read(store, job.id, first, last)
-        except _UNREADABLE:
-            yield from _one_by_one(store, job.id, first, last)
-        else:
-            yield from (piece.iteration(index) for index in range(first, last))
+        yield from _between(store, job.id, first, min(first + step, end))
 
 
-def _one_by_one(store: Store, job_id: str, first: int, last: int) -> Iterator[Stored]:
-    """Read one by one to locate the damage. Raises BrokenChain."""
-    for index in range(first, last):
-        try:
-            piece = _Piece.read(store, job_id, index, index + 1)
-        except _UNREADABLE as error:
-            raise BrokenChain(index, f"it cannot be read: {str(error)[:200]}") from error
-        yield piece.iteration(index)
+def _between(store: Store, job_id: str, first: int, last: int) -> Iterator[Stored]:
+    try:
+        piece = _Piece.read(store, job_id, first, last)
+    except _UNREADABLE as error:
+        if last == first + 1:
+            raise BrokenChain(first, f"it cannot be read: {str(error)[:200]}") from error
+        # Locate the damage.
+        for index in range(first, last):
+            yield from _between(store, job_id, index, index + 1)
+    else:
+        yield from (piece.iteration(index) for index in range(first, last))
 
 
 def _check_ask(link: Link) -> None:
@@ -330,18 +326,10 @@ def check_histories(store: Store) -> list[str]:
 
 def _broken(store: Store) -> Iterator[str]:
     for job_id in (job.id for job in every(lambda after: store.jobs(after=after))):
-        try:
-            job = store.job(job_id)
-            problem = _problem(store, job)
-            if problem:
+        with suppress(NotFound):
+            check = check_history(store, store.job(job_id))
+            if check.problem:
                 # The rows of a job deleted meanwhile disappear piece by piece.
                 store.job(job_id)
-                yield f"job {job_id} differs from what was committed: {problem}"
-        except NotFound:
-            continue
-
-
-def _problem(store: Store, job: Job) -> str:
-    check = check_history(store, job)
-    where = "" if check.broken_at is None else f"iteration {check.broken_at}: "
-    return f"{where}{check.problem}" if check.problem else ""
+                where = "" if check.broken_at is None else f"iteration {check.broken_at}: "
+                yield f"job {job_id} differs from what was committed: {where}{check.problem}"

@@ -1,15 +1,4 @@
-"""Exit codes of `gaitswarm`, and the errors that cause them.
-
-0    done
-1    the job failed, was cancelled or was paused, or a check failed
-2    invalid usage or input; the message names the option, file or field
-3    no such job, iteration, database or result
-4    not possible in the job's current state
-5    server, database, workers, compiler, files, memory or standard output unavailable
-6    permission denied; the message names the required token
-70   a bug; the traceback shows where
-130  interrupted
-"""
+"""Exit codes of `gaitswarm`, and the errors that cause them."""
 
 from __future__ import annotations
 
@@ -23,13 +12,13 @@ class ExitCode(IntEnum):
     """Exit codes, documented in docs/reference/commands.md."""
 
     OK = 0
-    JOB_FAILED = 1
-    BAD_INPUT = 2
-    NOT_FOUND = 3
-    CONFLICT = 4
-    UNAVAILABLE = 5
-    FORBIDDEN = 6
-    BUG = 70
+    JOB_FAILED = 1  # or was cancelled or paused, or a check failed
+    BAD_INPUT = 2  # the message names the option, file or field
+    NOT_FOUND = 3  # no such job, iteration, database or result
+    CONFLICT = 4  # not possible in the job's current state
+    UNAVAILABLE = 5  # server, database, workers, compiler, files, memory or standard output
+    FORBIDDEN = 6  # the message names the required token
+    BUG = 70  # the traceback shows where
     INTERRUPTED = 130
 
 

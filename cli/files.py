@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.simulation import WalkLogView
+    pass
 
 
 @contextmanager
@@ -48,21 +48,3 @@ def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
-
-
-def write_walk_logs(path: Path, logs: Mapping[str, WalkLogView | None]) -> None:
-    """Write a NumPy archive with one array per quantity: 500 Hz, float64, NaN where undefined.
-
-    Names are those of `gaitswarm.sim.kernel.observation.WalkLog`; with several scenarios,
-    `<scenario>/<name>`.
-    """
-    import numpy as np
-
-    arrays = {
-        f"{scenario}/{name}" if len(logs) > 1 else name: np.array(column.values, dtype=np.float64)
-        for scenario, log in logs.items()
-        if log is not None
-        for name, column in log.columns.items()
-    }
-    with replacing(path, "log") as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)

@@ -190,7 +190,17 @@ Precision = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class SpecOptions:
+class GivenOptions:
+    """Options of which None says that the user did not pass them."""
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Options that the user passed, by name."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class SpecOptions(GivenOptions):
     """Options of commands that submit a job; None keeps the value of the spec file."""
 
     spec: Annotated[
@@ -278,11 +288,6 @@ class SpecOptions:
     robot: RobotOption = None
     precision: Precision = None
     name: JobName = None
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """Options that the user passed, by name."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 
@@ -12,6 +13,7 @@ import typer
 from gaitswarm.cli.commands.designs import without_logs
 from gaitswarm.cli.options import (
     ControllerOption,
+    GivenOptions,
     JobName,
     Place,
     Precision,
@@ -37,6 +39,62 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 
+@dataclass(frozen=True, slots=True)
+class CertificateOptions(GivenOptions):
+    """Options that make the spec; None keeps the value of an earlier certificate."""
+
+    worlds: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Number of worlds. [default: 1000]")
+    ] = None
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the worlds. [default: 1]")] = None
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas. Default: those of the job, of"
+            " the robot's folder or of table 4.2, and at least two held-out ones, for a total of"
+            " eight."
+        ),
+    ] = None
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range",
+            metavar="NAME=LOW:HIGH",
+            help="Draw this perturbation from another range; repeatable.",
+        ),
+    ] = None
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Fix this perturbation in all worlds; repeatable.",
+        ),
+    ] = None
+    only: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="Draw only these perturbations; others stay nominal. Default: all.",
+        ),
+    ] = None
+    controller: ControllerOption = None
+    robot: RobotOption = None
+    preference: PreferenceOption = None
+    precision: Precision = None
+    engines: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--engine",
+            metavar="mujoco|mujoco-contacts",
+            help="Also simulate the nominal world in this engine and show the differences: MuJoCo"
+            " with our contact laws, or with its own contacts. Repeatable; needs pip install"
+            " 'gaitswarm[mujoco]'.",
+        ),
+    ] = None
+    name: JobName = None
+
+
 def certify(
     design: Annotated[
         str,
@@ -47,59 +105,8 @@ def certify(
             " and preference; or the id of a certificate to continue.",
         ),
     ],
+    options: CertificateOptions,
     *,
-    worlds: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Number of worlds. [default: 1000]")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the worlds. [default: 1]")
-    ] = None,
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas. Default: those of the job, of"
-            " the robot's folder or of table 4.2, and at least two held-out ones, for a total of"
-            " eight."
-        ),
-    ] = None,
-    ranges: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--range",
-            metavar="NAME=LOW:HIGH",
-            help="Draw this perturbation from another range; repeatable.",
-        ),
-    ] = None,
-    fixed: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Fix this perturbation in all worlds; repeatable.",
-        ),
-    ] = None,
-    only: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="Draw only these perturbations; others stay nominal. Default: all.",
-        ),
-    ] = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
-    preference: PreferenceOption = None,
-    precision: Precision = None,
-    engines: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--engine",
-            metavar="mujoco|mujoco-contacts",
-            help="Also simulate the nominal world in this engine and show the differences: MuJoCo"
-            " with our contact laws, or with its own contacts. Repeatable; needs pip install"
-            " 'gaitswarm[mujoco]'.",
-        ),
-    ] = None,
-    name: JobName = None,
     most: Annotated[int, typer.Option(min=0, max=1000, help="Worst worlds to list.")] = 5,
     replay: Annotated[
         int | None,
@@ -127,21 +134,7 @@ def certify(
     """
     from gaitswarm.cli.embedded import Embedded
 
-    values = {
-        "worlds": worlds,
-        "seed": seed,
-        "scenarios": scenarios,
-        "ranges": ranges,
-        "fixed": fixed,
-        "only": only,
-        "controller": controller,
-        "robot": robot,
-        "preference": preference,
-        "precision": precision,
-        "engines": engines,
-        "name": name,
-    }
-    spec = _certificate_spec(design, workers.db, values)
+    spec = _certificate_spec(design, workers.db, options.given)
     if replay is not None:
         return _replayed(spec, replay, log)
     if log is not None:
@@ -156,11 +149,10 @@ _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 """Options that are fields of the spec."""
 
 
-def _certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> CertificateSpec:
+def _certificate_spec(design: str, db: str | None, options: Mapping[str, Any]) -> CertificateSpec:
     """Return the spec of a design and options, or of an earlier certificate with options."""
     from gaitswarm.cli.inputs import chosen_robot, parse_spec, scenario_data
 
-    options = {name: value for name, value in given.items() if value is not None}
     document = _earlier(design, db, options) or _new(design, db, options)
     document |= {name: options[name] for name in _PLAIN if name in options}
     if "scenarios" in options:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import (
     ControllerOption,
     Place,
@@ -112,11 +113,26 @@ def simulate(
 
 
 def without_logs(view: SimulationView, path: Path | None) -> dict[str, Any]:
-    """Write the logs of a simulation if there is a path; return the rest as JSON."""
-    if path is not None:
-        from gaitswarm.cli.files import write_walk_logs
+    """Write the logs of a simulation if there is a path; return the rest as JSON.
 
-        write_walk_logs(path, {name: result.log for name, result in view.scenarios.items()})
+    The NumPy archive has one array per quantity: 500 Hz, float64, NaN where undefined. Names are
+    those of `gaitswarm.sim.kernel.observation.WalkLog`; with several scenarios,
+    `<scenario>/<name>`.
+    """
+    if path is not None:
+        import numpy as np
+
+        logs = {name: result.log for name, result in view.scenarios.items()}
+        arrays = {
+            f"{scenario}/{name}" if len(logs) > 1 else name: np.array(
+                column.values, dtype=np.float64
+            )
+            for scenario, log in logs.items()
+            if log is not None
+            for name, column in log.columns.items()
+        }
+        with replacing(path, "log") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
         note(f"log written to {path}")
     return view.model_dump(mode="json", exclude={"scenarios": {"__all__": {"log"}}})
 

@@ -181,11 +181,35 @@ def test_every_pod_runs_without_root(name: str) -> None:
     assert security["runAsNonRoot"] is True
     assert security["runAsUser"] > 0
     container = CONTAINERS[name]
-    assert "privileged" not in container.get("securityContext", {})
+    assert security["seccompProfile"] == {"type": "RuntimeDefault"}
+    assert container["securityContext"]["allowPrivilegeEscalation"] is False
+    assert container["securityContext"]["capabilities"] == {"drop": ["ALL"]}
+    assert "privileged" not in container["securityContext"]
     mounted = {mount["name"] for mount in container["volumeMounts"]}
     volumes = {volume["name"] for volume in PODS[name].get("volumes", [])}
     claims = _of_kind("StatefulSet").get(name, {}).get("volumeClaimTemplates", [])
     assert mounted == volumes | {claim["metadata"]["name"] for claim in claims}
+
+
+def test_a_policy_lets_in_who_uses_a_pod_and_nobody_else() -> None:
+    policies = _of_kind("NetworkPolicy")
+    labels = {
+        name: pod["metadata"]["labels"]
+        for kind in ("Deployment", "StatefulSet")
+        for name, pod in ((n, spec["template"]) for n, spec in _of_kind(kind).items())
+    }
+    # KubeRay labels the pods of a cluster.
+    (cluster,) = _of_kind("RayCluster")
+    labels["gaitswarm-ray"] = {"ray.io/cluster": cluster}
+    assert {n: p["podSelector"]["matchLabels"] for n, p in policies.items()} == labels
+    (database,) = policies["gaitswarm-postgres"]["ingress"]
+    (users,) = database["from"][0]["podSelector"]["matchExpressions"]
+    given = {name for name, c in CONTAINERS.items() if "GAITSWARM_DB" in _variables(c)}
+    assert set(users["values"]) == given and users["operator"] == "In"
+    for name, policy in policies.items():
+        ports = {port["port"] for rule in policy["ingress"] for port in rule.get("ports", [])}
+        container = CONTAINERS.get(name, {"ports": []})
+        assert ports <= {port["containerPort"] for port in container["ports"]}
 
 
 def test_services_lead_to_pods_and_ports_that_exist() -> None:

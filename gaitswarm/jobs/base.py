@@ -66,6 +66,7 @@ from gaitswarm.services.optimizer.analysis.front import (
     FrontView,
     pareto_front,
 )
+from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.analysis.identifiability import (
     IdentifiabilityView,
     check_comparable,
@@ -1130,7 +1131,7 @@ class Jobs(ABC):
             Conflict: The job cannot be read.
         """
         job = self._service.job(job_id)
-        return encoded_table(format, job.spec, self._service.column_pieces(job))
+        return encoded_table(format, job.spec, read_columns(self._service.store, job))
 
     @analysis(
         "GET /jobs/{job_id}/evidence",

@@ -14,6 +14,7 @@ from gaitswarm.errors import Interrupted, simulation_errors
 from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
+from gaitswarm.services.optimizer.analysis.history import read_columns, read_history
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -105,13 +106,13 @@ class DatabaseJobs(Jobs):
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
         """Read committed iterations with their designs, many at once."""
         spec = self._service.job(job_id).spec
-        for iteration, evaluations in self._service.history(job_id):
+        for iteration, evaluations in read_history(self._service.store, job_id):
             yield HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, spec)
 
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Read every evaluation."""
         job = self._service.job(job_id)
-        return EvaluationTable.from_pieces(job.spec, self._service.column_pieces(job))
+        return EvaluationTable.from_pieces(job.spec, read_columns(self._service.store, job))
 
     def delete(self, job_id: str) -> None:
         """Delete a job, and remove all of its rows."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,10 +15,7 @@ from gaitswarm.services.optimizer.analysis.fork import (
     with_start_designs,
 )
 from gaitswarm.services.optimizer.analysis.history import (
-    PIECE,
     HistoryCache,
-    read_columns,
-    read_history,
 )
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
@@ -29,7 +26,7 @@ from gaitswarm.services.optimizer.jobs.estimate import (
     estimate,
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Iteration
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, Quota, check_priority, refusal
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -205,17 +202,3 @@ class JobService:
     def columns(self, job: Job) -> EvaluationColumns:
         """Return every committed evaluation."""
         return self._histories.columns(job)
-
-    def column_pieces(self, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
-        """Yield the columns piece by piece, for histories of any length."""
-        return read_columns(self.store, job, rows=rows)
-
-    def history(
-        self, job_id: str, *, after: int | None = None
-    ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-        """Yield every committed iteration with its evaluations.
-
-        Read piece by piece: no transaction stays open, and iterations committed meanwhile are
-        included.
-        """
-        return read_history(self.store, job_id, after=after)

@@ -10,8 +10,8 @@ import httpx2
 import pyarrow.parquet as pq
 import pytest
 
+from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from gaitswarm.tables import encoded_table
@@ -85,7 +85,7 @@ def test_the_file_is_written_as_it_is_read(store: Store, job: Job, commit: Commi
     commit(job, 3)
     committed = store.job(job.id)
     for file_format in ("csv", "parquet"):
-        pieces = JobService(store).column_pieces(committed, rows=PARTICLES)
+        pieces = read_columns(store, committed, rows=PARTICLES)
         parts = encoded_table(file_format, job.spec, pieces)
         # One for the head or the foot of the file, and one for every piece.
         assert len(list(parts)) == 1 + 3

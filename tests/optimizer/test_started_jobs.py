@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -146,7 +147,7 @@ def test_a_file_of_designs_is_read_row_by_row(tmp_path: Path) -> None:
 
 def test_an_exported_job_is_a_file_of_designs(store: Store, tmp_path: Path) -> None:
     earlier = run(store, spec(()))
-    pieces = JobService(store).column_pieces(earlier)
+    pieces = read_columns(store, earlier)
     path = tmp_path / "export.csv"
     path.write_bytes(b"".join(encoded_table("csv", earlier.spec, pieces)))
     started = chosen_spec(SPEC, {"start": str(path)}).start

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
+from gaitswarm.services.optimizer.analysis.history import read_history
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState
-from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.services.optimizer.store.tables import iterations
@@ -182,7 +182,7 @@ def test_evaluations_of_several_iterations_come_in_order(store: Store) -> None:
 
 def test_the_whole_history_is_read_piece_by_piece(store: Store) -> None:
     claim = run(store, *[(1.0, 2.0)] * 20)
-    history = JobService(store).history(claim.job.id)
+    history = read_history(store, claim.job.id)
     head = next(history)
     # A reader that dawdles holds no transaction open, so the job goes on and is followed.
     store.commit(claim, completed(20), ask(21))
@@ -190,11 +190,6 @@ def test_the_whole_history_is_read_piece_by_piece(store: Store) -> None:
     assert [iteration.index for iteration, _ in [head, *rest]] == list(range(21))
     assert all([e.particle for e in found] == [0, 1] for _, found in rest)
     assert all(e.iteration == iteration.index for iteration, found in rest for e in found)
-
-
-def test_history_after_an_iteration_leaves_out_the_earlier_ones(store: Store) -> None:
-    job_id = run(store, *[(1.0, 2.0)] * 4).job.id
-    assert [i.index for i, _ in JobService(store).history(job_id, after=1)] == [2, 3]
 
 
 def test_states_are_kept_of_the_last_commit_and_the_next_ask_alone(

@@ -27,10 +27,12 @@ PIECE: Final = 2000
 _PIECE_ITERATIONS: Final = 16
 
 
-def read_history(
-    store: Store, job_id: str, *, after: int | None
-) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-    """Yield committed iterations with their evaluations, read piece by piece."""
+def read_history(store: Store, job_id: str) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
+    """Yield committed iterations with their evaluations, read piece by piece.
+
+    No transaction stays open, and iterations committed meanwhile are included.
+    """
+    after: int | None = None
     while True:
         page = store.iterations(job_id, after=after, limit=_PIECE_ITERATIONS)
         if page.items:
@@ -46,7 +48,7 @@ def read_history(
             return
 
 
-def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationColumns]:
+def read_columns(store: Store, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
     """Yield a job's evaluations as columns, read piece by piece."""
     step = iterations_of(rows, job)
     for first in range(0, job.progress.iterations, step):

@@ -71,16 +71,16 @@ class RecordingView(View):
 
 
 class RecordingEntryView(View):
-    """A recorded walk in a list. One that this server cannot read has an id, a time and a size."""
+    """A recorded walk in a list."""
 
     id: RecordingId
     created_at: datetime = Field(description="When it was first stored.")
-    scenario: str | None = Field(description="Name of its scenario; null if unreadable.")
-    controller: str | None = Field(description="Controller that drove it; null if unreadable.")
-    joints: int | None = Field(description="Joints whose currents were measured.", examples=[18])
-    rows: int | None = Field(description="Rows.", examples=[1500])
+    scenario: str = Field(description="Name of its scenario.")
+    controller: str = Field(description="Controller that drove it.")
+    joints: int = Field(description="Joints whose currents were measured.", examples=[18])
+    rows: int = Field(description="Rows.", examples=[1500])
     rate: float = Field(description="Rows a second [1/s].", examples=[500.0])
-    seconds: float | None = Field(description="Time that is compared [s].", examples=[3.0])
+    seconds: float = Field(description="Time that is compared [s].", examples=[3.0])
     size: int = Field(description="Characters of the stored document.", examples=[206113])
     synthetic: Synthetic
 

@@ -306,11 +306,8 @@ def recordings(
         rows = [
             (
                 entry.id,
-                (" ".join(filter(None, (entry.scenario, entry.controller))) or MISSING)
-                + (" SYNTHETIC" if entry.synthetic else ""),
-                MISSING
-                if entry.joints is None or entry.seconds is None
-                else f"{entry.joints} over {number(entry.seconds)} s",
+                f"{entry.scenario} {entry.controller}{' SYNTHETIC' if entry.synthetic else ''}",
+                f"{entry.joints} over {number(entry.seconds)} s",
                 f"{entry.created_at:%Y-%m-%d %H:%M}",
             )
             for entry in jobs.recordings(search=search, limit=limit)

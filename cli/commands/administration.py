@@ -111,6 +111,9 @@ def prune(
         float | None,
         typer.Option(min=0.0, metavar="DAYS", help="Also remove older audit entries."),
     ] = None,
+    trust_clock: Annotated[
+        bool, typer.Option("--trust-clock", help="Also after a jump of the clock.")
+    ] = False,
     db: Db = None,
 ) -> None:
     """Remove recordings older than a day that no job uses, and free their space.
@@ -127,6 +130,7 @@ def prune(
         older_than=None if older_than is None else timedelta(days=older_than),
         states=ENDED if state is None else {JobState(state)},
         audit_older_than=None if audit_older_than is None else timedelta(days=audit_older_than),
+        trusts_clock=trust_clock,
     )
     audit = f", {removed.audit} audit entries" if audit_older_than is not None else ""
     note(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 _SECONDS_PER_ROUND: Final = 10.0
 _ROUNDS_PER_RETENTION: Final = 360
+_LARGEST_STEP: Final = 3600.0
+_STEADY_SECONDS: Final = 86_400.0
 
 _log = logging.getLogger(__name__)
 
@@ -30,6 +33,8 @@ class Housekeeping:
         self._store = store
         self._retention = None if retention_days is None else timedelta(days=retention_days)
         self._audit_retention = None if audit_days is None else timedelta(days=audit_days)
+        self._offset = time.time() - time.monotonic()
+        self._steady_since = time.monotonic()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._rounds, name="housekeeping", daemon=True)
 
@@ -45,6 +50,7 @@ class Housekeeping:
 
     def round(self, *, retention: bool = True) -> None:
         """Run one round."""
+        retention = retention and self._trusts_clock()
         if retention and self._retention is not None:
             deleted = self._store.delete_ended_before(datetime.now(UTC) - self._retention)
             for job_id in deleted:
@@ -56,6 +62,21 @@ class Housekeeping:
                     "%d audit log entries removed: older than %s", removed, self._audit_retention
                 )
         self._store.purge_deleted(self._stop.is_set)
+
+    def _trusts_clock(self) -> bool:
+        """Return whether ages are right, as far as the database and this process can tell."""
+        offset = time.time() - time.monotonic()
+        if abs(offset - self._offset) > _LARGEST_STEP:
+            self._offset, self._steady_since = offset, time.monotonic()
+        jump = self._store.clock_jump()
+        if jump is None or time.monotonic() - self._steady_since > _STEADY_SECONDS:
+            return True
+        _log.warning(
+            "the clock is %s ahead of the last change before: check it; nothing is deleted for its"
+            " age until the clock has been steady for a day",
+            jump,
+        )
+        return False
 
     def _rounds(self) -> None:
         number = 0

@@ -14,10 +14,11 @@ from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store import Store, open_store
 from tests.api.conftest import Commit
 from tests.examples.processes import eventually
 from tests.examples.servers import ServerProcess
+from tests.store.examples import Clock
 
 
 def test_a_job_is_deleted_once(client: httpx2.Client, job: Job, commit: Commit) -> None:
@@ -77,6 +78,24 @@ def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
     assert len(store.jobs().items) == 2
     Housekeeping(store, retention_days=0.1 / 86_400).round()
     assert [job.id for job in store.jobs().items] == [young.id]
+
+
+def test_housekeeping_deletes_nothing_until_the_clock_was_steady_for_a_day(
+    database: Path, spec: JobSpec, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock = Clock()
+    clock.now = datetime.now(UTC) - timedelta(days=60)
+    with closing(open_store(str(database), clock=clock)) as store:
+        job, _ = store.create_job(spec)
+        store.command(job.id, Command.CANCEL)
+    with closing(open_store(str(database))) as store:
+        keeper = Housekeeping(store, retention_days=1.0)
+        keeper.round()
+        assert [found.id for found in store.jobs().items] == [job.id]
+        assert "ahead of the last change" in caplog.text
+        monkeypatch.setattr("gaitswarm.services.optimizer.housekeeping._STEADY_SECONDS", 0.0)
+        keeper.round()
+        assert store.jobs().items == ()
 
 
 def test_housekeeping_removes_old_entries_of_the_audit_log_only_if_configured(

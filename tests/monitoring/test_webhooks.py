@@ -173,6 +173,19 @@ def test_a_notification_that_is_never_accepted_is_given_up(database: Path) -> No
     store.close()
 
 
+def test_a_notification_that_a_wrong_clock_put_off_is_due(database: Path) -> None:
+    clock = Clock()
+    store = open_store(str(database), clock=clock)
+    cancelled(store, "http://ci.example/")
+    clock.advance(86_400.0)
+    ahead = store.outbox.take(lease_seconds=60.0)
+    clock.advance(-86_400.0)
+    due = store.outbox.take(lease_seconds=60.0)
+    assert ahead is not None and due is not None and due.id == ahead.id
+    assert store.outbox.take(lease_seconds=60.0) is None
+    store.close()
+
+
 def test_a_notification_is_leased_by_one_sender_at_a_time(
     database: Path,
 ) -> None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import re
 import sqlite3
 from contextlib import closing
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from gaitswarm.services.optimizer.analysis.verification import check_histories
-from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.errors import Conflict, NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.optimizer.store.maintenance import Pruned, check, prune
-from tests.store.examples import ask, begun, completed
+from tests.store.examples import Clock, ask, begun, completed
 from tests.store.examples import spec as walks
 from tests.store.test_opening import edit
 from tests.store.test_recordings import recording
@@ -147,3 +147,36 @@ def test_rows_that_a_deleted_job_still_has_are_no_contradiction(
     assert check(database_url) != []
     edit(database_url, "UPDATE jobs SET deleted_at = '2026-01-01 00:00:00'")
     assert check(database_url) == []
+
+
+def test_a_jump_of_the_clock_is_noticed_until_there_are_changes_for_a_day(
+    store: Store, clock: Clock
+) -> None:
+    def after(hours: float) -> timedelta | None:
+        clock.advance(hours * 3600.0)
+        return store.clock_jump()
+
+    assert store.clock_jump() is None
+    for _ in range(4):
+        store.create_job(walks())
+        assert after(hours=12) is None
+    jumped = after(hours=60 * 24)
+    assert jumped is not None and jumped.days == 60
+    for _ in range(2):
+        store.create_job(walks())
+        assert after(hours=11) is not None
+    store.create_job(walks())
+    assert after(hours=11) is None
+
+
+def test_nothing_is_pruned_by_age_after_a_jump_of_the_clock_unless_it_is_trusted(
+    database: Path, clock: Clock
+) -> None:
+    clock.now = datetime.now(UTC) - timedelta(days=60)
+    with closing(open_store(str(database), clock=clock)) as store:
+        job, _ = store.create_job(walks())
+        store.command(job.id, Command.CANCEL)
+    day = timedelta(days=1)
+    with pytest.raises(Conflict, match=r"days.* ahead of the last change .*--trust-clock"):
+        prune(str(database), older_than=day)
+    assert prune(str(database), older_than=day, trusts_clock=True).jobs == (job.id,)

@@ -14,7 +14,7 @@ MOST_ATTEMPTS: Final = 16
 """About six hours with the pauses below."""
 
 _FIRST_PAUSE: Final = 5.0
-_LONGEST_PAUSE: Final = 3600.0
+LONGEST_PAUSE: Final = 3600.0
 
 _LONGEST_URL: Final = 2000
 
@@ -38,7 +38,7 @@ def pause_after(attempts: int) -> float | None:
     """Return the pause after a failed attempt [s]; None to give up."""
     if attempts >= MOST_ATTEMPTS:
         return None
-    return float(min(_FIRST_PAUSE * 2.0 ** (attempts - 1), _LONGEST_PAUSE))
+    return float(min(_FIRST_PAUSE * 2.0 ** (attempts - 1), LONGEST_PAUSE))
 
 
 def unusable_url(url: str) -> str | None:

@@ -7,10 +7,10 @@ import json
 import time
 from collections.abc import Callable, Collection
 from dataclasses import asdict
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any, Final
 
-from sqlalchemy import Connection, Table, delete, exists, insert, select, update
+from sqlalchemy import Connection, Table, delete, exists, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import (
@@ -73,6 +73,7 @@ _EVALUATIONS_AT_ONCE: Final = 5000
 """Removed in one transaction."""
 
 _JOBS_AT_ONCE: Final = 500
+_STEADY: Final = timedelta(days=1)
 """Marked as deleted in one transaction."""
 
 _DELETED: Final = select(jobs.c.id).where(jobs.c.deleted_at.is_not(None)).limit(1)
@@ -378,6 +379,24 @@ class Jobs(Aggregate):
             _mark_deleted(connection, [job_id], self._clock(connection), actor)
             if row["evaluations"] <= _EVALUATIONS_AT_ONCE:
                 _remove_rows(connection, job_id)
+
+    def clock_jump(self) -> timedelta | None:
+        """Return by how much the clock has jumped ahead in the last day; None if it has not.
+
+        A day without any change, and less than a day with changes since, counts as a jump: what
+        ended before it may seem older than it is.
+        """
+        changed = jobs.c.updated_at
+        with self._database.read("clock_jump") as connection:
+            now = self._clock(connection)
+            before = connection.execute(
+                select(func.max(changed)).where(changed <= now - _STEADY)
+            ).scalar()
+            if before is None:
+                return None
+            after = connection.execute(select(func.min(changed)).where(changed > before)).scalar()
+        jump: timedelta = (after or now) - before
+        return jump if jump > _STEADY else None
 
     def delete_ended_before(
         self, moment: datetime, states: Collection[JobState] = ENDED

@@ -311,17 +311,28 @@ def prune(
     older_than: timedelta | None = None,
     states: Collection[JobState] = ENDED,
     audit_older_than: timedelta | None = None,
+    trusts_clock: bool = False,
 ) -> Pruned:
     """Remove old jobs, as `Store.delete_ended_before`, old audit entries and unused recordings.
 
-    Free space is returned to the file system. An age of None removes none of its kind. Raises
-    StoreUnavailable if the database cannot be written or lacks the newest schema.
+    Free space is returned to the file system. An age of None removes none of its kind.
+
+    Raises:
+        Conflict: the clock has jumped, and is not trusted, so that ages may be wrong.
+        StoreUnavailable: the database cannot be written or lacks the newest schema.
     """
     with closing(Database(url, for_migration=True)) as database:
         check_revision(database)
         store = Store(database)
         with database.read() as connection:
             now = database_time(connection)
+        by_age = older_than is not None or audit_older_than is not None
+        jump = store.clock_jump() if by_age and not trusts_clock else None
+        if jump is not None:
+            raise Conflict(
+                f"the clock is {jump} ahead of the last change before: check it, and if it is"
+                " right, repeat with --trust-clock"
+            )
         removed: tuple[str, ...] = ()
         if older_than is not None:
             removed = store.delete_ended_before(now - older_than, states)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from datetime import timedelta
 
-from sqlalchemy import select, update
+from sqlalchemy import or_, select, update
 
-from gaitswarm.services.optimizer.jobs.notification import Notification, pause_after
+from gaitswarm.services.optimizer.jobs.notification import (
+    LONGEST_PAUSE,
+    Notification,
+    pause_after,
+)
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import require_job
 from gaitswarm.services.optimizer.store.tables import Row, notifications
@@ -25,14 +29,18 @@ class Outbox(Aggregate):
             The notification; None if none is due.
         """
         due = notifications.c.next_attempt_at
+        longest = timedelta(seconds=max(LONGEST_PAUSE, lease_seconds))
         # Mostly none is due, and looking needs no lock.
         with self._database.read("notification_take") as connection:
             now = self._clock(connection)
-            if connection.execute(select(due).where(due <= now).limit(1)).first() is None:
+            # A later time was written by a wrong clock.
+            is_due = or_(due <= now, due > now + longest)
+            if connection.execute(select(due).where(is_due).limit(1)).first() is None:
                 return None
         with self._database.write("notification_take") as connection:
             now = self._clock(connection)
-            query = select(notifications).where(due <= now).order_by(due).limit(1)
+            is_due = or_(due <= now, due > now + longest)
+            query = select(notifications).where(is_due).order_by(due).limit(1)
             locked = query.with_for_update(skip_locked=True)
             row = connection.execute(locked).mappings().first()
             if row is None:

@@ -163,6 +163,10 @@ def pytest_configure() -> None:
     """Before anything is collected, let alone run."""
     # What is imported and collected lasts: nothing of it is garbage.
     gc.disable()
+    # Databases of tests need not survive a power cut: half of their time is waiting for the disk.
+    from gaitswarm.services.optimizer.store import engine
+
+    vars(engine)["SYNCHRONOUS"] = "OFF"
     # Ray's workers run at normal priority, so that other tests do not starve them.
     os.environ.setdefault("RAY_worker_niceness", "1")
 

@@ -31,6 +31,9 @@ for _name in (
 ):
     import_module(_name)
 
+# As in the process of the tests.
+vars(import_module("gaitswarm.services.optimizer.store.engine"))["SYNCHRONOUS"] = "OFF"
+
 
 def main(
     program: Callable[[], object],

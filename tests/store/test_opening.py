@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.store import engine as engine_module
 from gaitswarm.services.optimizer.store.engine import Database, parse_url
 from gaitswarm.services.optimizer.store.schema import MIGRATIONS, head, lock_for_migration
 from tests.examples.forked import ForkedCommand
-from tests.examples.processes import loaded_by, output
+from tests.examples.processes import loaded_by, output, python
 from tests.optimizer.formula import SPEC
 from tests.store import worker_process
 from tests.store.examples import LEASE, spec
@@ -247,18 +247,19 @@ def test_what_a_driver_says_is_shown_without_passwords() -> None:
     database.close()
 
 
+@pytest.mark.slow
 def test_a_committed_iteration_survives_a_power_cut(tmp_path: Path) -> None:
-    database = Database(str(tmp_path / "runs.db"))
-    with database.read() as connection:
-
-        def pragma(name: str) -> object:
-            return connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
-
-        full = 2
-        assert (pragma("journal_mode"), pragma("synchronous")) == ("wal", full)
-        assert pragma("foreign_keys") == 1
-        assert pragma("busy_timeout") == engine_module.BUSY_SECONDS * 1000
-    database.close()
+    """In a process whose databases are not those of tests."""
+    done = python(
+        "-c",
+        "from gaitswarm.services.optimizer.store.engine import Database\n"
+        f"with Database({str(tmp_path / 'runs.db')!r}).read() as connection:\n"
+        "    for name in ('journal_mode', 'synchronous', 'foreign_keys', 'busy_timeout'):\n"
+        "        print(connection.exec_driver_sql(f'PRAGMA {name}').scalar_one())",
+    )
+    full = 2
+    busy = engine_module.BUSY_SECONDS * 1000
+    assert done.stdout.split() == ["wal", *(f"{value:g}" for value in (full, 1, busy))], done.stderr
 
 
 def test_a_database_that_stays_locked_is_unavailable_to_writers_but_not_to_readers(

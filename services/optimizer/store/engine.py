@@ -289,6 +289,10 @@ def _strict_json(value: object) -> str:
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
+SYNCHRONOUS = "FULL"
+"""Whether what is committed survives a power cut; tests turn it off."""
+
+
 def _sqlite_engine(url: sa.URL, options: dict[str, Any], *, foreign_keys: bool) -> sa.Engine:
     # Without an isolation level the driver begins no transaction of its own.
     connect_args = {"isolation_level": None, "timeout": BUSY_SECONDS}
@@ -299,8 +303,7 @@ def _sqlite_engine(url: sa.URL, options: dict[str, Any], *, foreign_keys: bool) 
         _enable_write_ahead_log(connection)
         # A text that is not UTF-8 must not hide the other rows of a query.
         connection.text_factory = partial(str, encoding="utf-8", errors="replace")
-        # A committed iteration survives a power cut.
-        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
         connection.execute(f"PRAGMA cache_size = {-_CACHE_KIB}")
         connection.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
 

@@ -6,7 +6,7 @@ from gaitswarm.jobs.base import JobEvent, Jobs
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
-from gaitswarm.optimization import OptimizationResult, optimize, optimizers, robust_preferences
+from gaitswarm.optimization import OptimizationResult, optimize, optimizers
 from gaitswarm.replay import WalkReplay
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
@@ -94,8 +94,8 @@ __all__ = [
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
     "Variable", "VerificationView", "WalkLog", "WalkReplay", "__version__", "connect",
-    "connect_async", "job_spec", "open", "open_async", "optimize", "optimizers",
-    "robust_preferences", "robustness", "simulate", "verify", "write_firmware",
+    "connect_async", "job_spec", "open", "open_async", "optimize", "optimizers", "robustness",
+    "simulate", "verify", "write_firmware",
 ]  # fmt: skip
 
 __version__: str

@@ -1,35 +1,24 @@
-"""`gaitswarm.optimize` and `robust_preferences`: a job run or examined in this process."""
+"""`gaitswarm.optimize`: a job run in this process."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.errors import JobEnded
-from gaitswarm.jobs.base import Jobs
 from gaitswarm.jobs.database import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
-from gaitswarm.robustness_index import Progress, sampled_indices
-from gaitswarm.services.optimizer.analysis.preferences import (
-    PreferencesRequest,
-    RobustPreferencesView,
-)
-from gaitswarm.services.optimizer.analysis.preferences import (
-    robust_preferences as ranked_preferences,
-)
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
-from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.specs import SpecInput, SpecOptions, checked, job_spec
+from gaitswarm.specs import SpecInput, SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views.catalogue import OptimizerView, optimizer_views
 from gaitswarm.views.job import BestView, IterationView, JobView
@@ -181,54 +170,3 @@ def optimizers() -> list[OptimizerView]:
         Each with its description, its settings and their JSON schema.
     """
     return optimizer_views()
-
-
-def robust_preferences(
-    jobs: Jobs,
-    job_id: str,
-    *,
-    drawn: int = 512,
-    candidates: int = 8,
-    samples: int = 128,
-    radius: float = 0.02,
-    seed: int = 1,
-    precision: Precision = "double",
-    progress: Progress | None = None,
-) -> RobustPreferencesView:
-    """Find the preference whose winner among a job's designs is the most robust.
-
-    The designs are ranked under A, B and C (table 4.5) and under preferences that are drawn at
-    random; the robustness index (thesis 4.4.3) of the winners is estimated by simulation. Only
-    designs of the job can win. `Jobs.preferences` simulates them where the jobs are.
-
-    Args:
-        jobs: Database or server of the job.
-        job_id: Identifier of a job that tunes a drive.
-        drawn: How many preferences to draw.
-        candidates: Winners to simulate: those of A, B and C, and of the others those that win under
-            most preferences.
-        samples: Designs to simulate around each; 0 for no simulation and no index.
-        radius: How far they are from it at most, as a share of each variable's bounds.
-        seed: Of preferences and samples.
-        precision: Of the physics' numbers.
-        progress: Called with the number of simulations done and their total.
-
-    Returns:
-        The candidates, the most robust first, with their loss under the job's own preference.
-
-    Raises:
-        InvalidRequest: The job tunes no drive, or an argument is invalid; names it.
-        Conflict: No design of the job succeeds in all scenarios.
-    """
-    document = {
-        "drawn": drawn,
-        "candidates": candidates,
-        "samples": samples,
-        "radius": radius,
-        "seed": seed,
-        "precision": precision,
-    }
-    request = checked(PreferencesRequest, document)
-    columns = jobs.evaluations(job_id).evaluations
-    index = partial(sampled_indices, progress=progress)
-    return ranked_preferences(job_id, jobs.job(job_id).spec, columns, request, index)

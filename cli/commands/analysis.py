@@ -6,8 +6,9 @@ import csv
 import io
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
         LossView,
         ScenarioFamiliesView,
     )
-    from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
     from gaitswarm.simulation import SimulationView
 
 
@@ -411,25 +411,31 @@ def preferences(
     Ranks stored designs under many preferences, and estimates the robustness index of the winners
     by simulation. With --for, finds the preference that makes a design the best.
     """
-    from gaitswarm.optimization import robust_preferences
+    from gaitswarm.robustness_index import sampled_indices
+    from gaitswarm.services.optimizer.analysis.preferences import (
+        PreferencesRequest,
+        robust_preferences,
+    )
     from gaitswarm.settings import read_place
+    from gaitswarm.specs import checked
 
     if for_design is not None:
         iteration, particle = read_place(for_design, field="for")
         fits = jobs.preference_for(job_id, iteration, particle)
         return fits, _fits(fits)
+    options = {
+        "drawn": drawn,
+        "candidates": candidates,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+        "precision": precision,
+    }
+    request = checked(PreferencesRequest, options)
+    spec, columns = jobs.job(job_id).spec, jobs.evaluations(job_id).evaluations
     with shown_progress() as progress:
-        view = robust_preferences(
-            jobs,
-            job_id,
-            drawn=drawn,
-            candidates=candidates,
-            samples=samples,
-            radius=radius,
-            seed=seed,
-            precision=cast("PhysicsPrecision", precision or "double"),
-            progress=progress,
-        )
+        index = partial(sampled_indices, progress=progress)
+        view = robust_preferences(job_id, spec, columns, request, index)
     return view, _preferences(view)
 
 

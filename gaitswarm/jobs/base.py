@@ -905,8 +905,7 @@ class Jobs(ABC):
     ) -> RobustPreferencesView:
         """Find the preference whose winner among a job's designs is the most robust.
 
-        The winners' robustness index is estimated on request, by simulations where the jobs are;
-        see `gaitswarm.robust_preferences` for simulations in this process.
+        The winners' robustness index is estimated on request, by simulations where the jobs are.
 
         Args:
             job_id: Identifier of a job that tunes a drive.

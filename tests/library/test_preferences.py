@@ -18,8 +18,7 @@ def test_winners_are_the_same_wherever_they_are_ranked_and_walk(
     indices = [found.index.value for found in view.candidates if found.index is not None]
     assert indices == sorted(indices) != []
     with gaitswarm.open(finished.db) as here:
-        asked = gaitswarm.robust_preferences(here, finished.id, drawn=16, candidates=2, samples=40)
-    assert view == asked
+        assert view == here.preferences(finished.id, drawn=16, candidates=2, samples=40)
 
 
 def test_without_samples_nothing_walks_and_the_named_come_first(

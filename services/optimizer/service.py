@@ -14,9 +14,7 @@ from gaitswarm.services.optimizer.analysis.fork import (
     forked,
     with_start_designs,
 )
-from gaitswarm.services.optimizer.analysis.history import (
-    HistoryCache,
-)
+from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.estimate import (

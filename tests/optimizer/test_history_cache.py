@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.history import HistoryCache, HistoryMemory
+from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Claim, Job
@@ -92,18 +92,13 @@ def test_the_job_asked_about_longest_ago_is_dropped_first(
         claim = begun(store)
         go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
         jobs.append(store.job(claim.job.id))
-    whole = HistoryMemory()
-    kept = HistoryCache(store, memory=whole)
-    kept.columns(jobs[0])
-    size = whole.nbytes
-
-    memory = HistoryMemory(2 * size)
-    cache = HistoryCache(store, memory=memory)
+    size = memory_of_one(store, jobs[0])
+    cache = HistoryCache(store, max_bytes=2 * size)
     first = cache.columns(jobs[0])
     cache.columns(jobs[1])
     cache.columns(jobs[0])
     cache.columns(jobs[2])
-    assert memory.nbytes <= 2 * size
+    assert cache.nbytes <= 2 * size
     asked: list[str] = []
     read = Store.evaluation_columns
 
@@ -122,7 +117,7 @@ def test_a_job_that_is_too_large_is_refused_with_the_way_out(store: Store) -> No
     claim = begun(store)
     go_on(store, claim, (4.0, 3.0))
     with pytest.raises(Conflict, match="export"):
-        HistoryCache(store, memory=HistoryMemory(100)).columns(store.job(claim.job.id))
+        HistoryCache(store, max_bytes=100).columns(store.job(claim.job.id))
 
 
 def jobs_with_history(store: Store, count: int) -> list[Job]:
@@ -135,24 +130,22 @@ def jobs_with_history(store: Store, count: int) -> list[Job]:
 
 
 def memory_of_one(store: Store, job: Job) -> int:
-    memory = HistoryMemory()
-    cache = HistoryCache(store, memory=memory)
+    cache = HistoryCache(store)
     cache.columns(job)
-    return memory.nbytes
+    return cache.nbytes
 
 
-def test_many_jobs_in_many_threads_and_caches_stay_within_one_bound(store: Store) -> None:
+def test_many_jobs_in_many_threads_stay_within_the_bound(store: Store) -> None:
     jobs = jobs_with_history(store, 12)
     bound = 3 * memory_of_one(store, jobs[0])
-    memory = HistoryMemory(bound)
-    caches = [HistoryCache(store, memory=memory) for _ in range(2)]
+    cache = HistoryCache(store, max_bytes=bound)
     most, wrong = [0], []
 
     def ask_about_all(offset: int) -> None:
         for k in range(3 * len(jobs)):
             job = jobs[(k + offset) % len(jobs)]
-            columns = caches[k % 2].columns(job)
-            most[0] = max(most[0], memory.nbytes)
+            columns = cache.columns(job)
+            most[0] = max(most[0], cache.nbytes)
             if len(columns) != job.progress.evaluations:
                 wrong.append(job.id)
             del columns
@@ -164,14 +157,11 @@ def test_many_jobs_in_many_threads_and_caches_stay_within_one_bound(store: Store
         thread.join()
     assert not wrong
     assert 0 < most[0] <= bound
-    caches.clear()
-    assert memory.nbytes == 0
 
 
 def test_columns_that_are_computed_with_count_until_they_are_let_go(store: Store) -> None:
     first, second = jobs_with_history(store, 2)
-    memory = HistoryMemory(memory_of_one(store, first), longest_wait=0.05)
-    cache = HistoryCache(store, memory=memory)
+    cache = HistoryCache(store, max_bytes=memory_of_one(store, first), longest_wait=0.05)
     used = cache.columns(first).rows(slice(1, 2))
     with pytest.raises(EvaluatorUnavailable, match="try again"):
         cache.columns(second)
@@ -183,8 +173,7 @@ def test_columns_that_are_computed_with_count_until_they_are_let_go(store: Store
 
 def test_memory_is_waited_for(store: Store) -> None:
     first, second = jobs_with_history(store, 2)
-    memory = HistoryMemory(memory_of_one(store, first), longest_wait=60.0)
-    cache = HistoryCache(store, memory=memory)
+    cache = HistoryCache(store, max_bytes=memory_of_one(store, first), longest_wait=60.0)
     used = [cache.columns(first)]
     threading.Timer(0.1, used.clear).start()
     assert len(cache.columns(second)) == 20
@@ -195,8 +184,7 @@ def test_a_history_that_grows_beyond_half_of_the_memory_is_read_again(store: Sto
     go_on(store, claim, *[(4.0, 3.0)] * 6)
     job = store.job(claim.job.id)
     # Room for one history of 8 iterations, not for another of 6.
-    memory = HistoryMemory(memory_of_one(store, job) * 8 // 6)
-    cache = HistoryCache(store, memory=memory)
+    cache = HistoryCache(store, max_bytes=memory_of_one(store, job) * 8 // 6)
     cache.columns(job)
     go_on(store, claim, *[(2.0, 1.0)] * 2)
     assert_as_row_by_row(store, job.id, cache.columns(store.job(job.id)))

@@ -148,17 +148,13 @@ def figure_of_merit(fitness: float, preference: Preference) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def judge(
-    objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
-) -> Judgement:
+def judge(objectives: Floats, failed: NDArray[np.bool_], preference: Preference) -> Judgement:
     """Judge designs by the bias-weighted product and the geometric mean (eq. 4.1, 4.2)."""
     logarithms = log_utilities(objectives, failed, preference)
     return Judgement(geometric_mean(logarithms), logarithms)
 
 
-def log_utilities(
-    objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
-) -> NDArray[np.float64]:
+def log_utilities(objectives: Floats, failed: NDArray[np.bool_], preference: Preference) -> Floats:
     """Logarithm of the bias-weighted product (eq. 3.8, 4.1)."""
     flat, lost = objectives.reshape(-1, objectives.shape[-1]), failed.reshape(-1)
 
@@ -169,7 +165,7 @@ def log_utilities(
     return _by_pieces(len(flat), compute).reshape(failed.shape)
 
 
-def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
+def geometric_mean(log_utility: Floats) -> Floats:
     """Geometric mean over scenarios (eq. 4.2)."""
 
     def compute(piece: slice) -> Iterator[float]:
@@ -180,32 +176,27 @@ def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def objective_vectors(
-    objectives: NDArray[np.float64],
+    objectives: Floats,
     failed: NDArray[np.bool_],
     bias: Sequence[float] = (0.0,) * 5,
-) -> NDArray[np.float64]:
+    aggregate: Callable[[Floats], Floats] = lambda logarithms: logarithms,
+) -> Floats:
     """Return each design's objectives over all scenarios, (n, M), for Pareto fronts.
 
-    Objective m is the geometric mean over scenarios of b_m + f_m. Under any preference with these
-    biases, fitness is the product of the objectives, each raised to its exponent (eq. 4.1, 4.2); so
-    for all exponents the best design is non-dominated.
+    Objective m is the fitness under a preference that weighs it alone. Under any preference with
+    these biases, fitness is the product of the objectives, each raised to its exponent (eq. 4.1,
+    4.2); so for all exponents the best design is non-dominated.
+
+    aggregate: converts (n, K) logarithms of utilities to those of scenarios. Worlds aggregate each
+    objective separately: the worst world of one may be the best of another.
     """
-    count = len(bias)
-    factors = objectives[:, :, :count].copy()
-    factors[:, :, HEIGHT_LOSS:] = np.abs(factors[:, :, HEIGHT_LOSS:])
-    factors += np.asarray(bias, dtype=np.float64)
-    bad = np.logical_or(failed.any(axis=1), ~np.isfinite(factors).all(axis=(1, 2)))
-    logarithms = [
-        [[math.log(f) if f > 0.0 else -math.inf for f in scenario] for scenario in design]
-        for design in np.where(bad[:, None, None], 1.0, factors).tolist()
-    ]
-    means = [
-        [exponential(math.fsum(column) / len(column)) for column in zip(*design, strict=True)]
-        for design in logarithms
-    ]
-    result = np.array(means, dtype=np.float64).reshape(len(objectives), count)
-    result[bad] = math.inf
-    return result
+    columns = []
+    for exponent in np.eye(len(bias)).tolist():
+        alone = Preference(bias=tuple(bias), exponent=tuple(exponent))
+        columns.append(geometric_mean(aggregate(log_utilities(objectives, failed, alone))))
+    vectors = np.stack(columns, axis=1)
+    vectors[~np.isfinite(vectors).all(axis=1)] = math.inf
+    return vectors
 
 
 def _log_product(row: list[float], preference: Preference) -> float:

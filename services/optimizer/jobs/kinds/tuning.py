@@ -288,39 +288,21 @@ class JobSpec(WalksSpec):
         return (*CONTROLLERS.distribution(self.controller), *case)
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the preference and the aggregate over worlds.
-
-        Args:
-            objectives: (n, K, 6) raw objectives.
-            failed: (n, K), true for a simulation without a result.
-        """
         judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
 
     def search_feedback(
         self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats
     ) -> Floats:
-        if METHODS[self.search.name].multi_objective:
-            return self.objective_vectors(objectives, failed)
-        return fitness
+        """Return the fitness; for a multi-objective method f1 to f5 over all scenarios.
 
-    def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """Return (n, 5) objectives f1 to f5 over all scenarios, without biases.
-
-        They depend on no preference, so neither does the path of a multi-objective search.
-
-        Args:
-            objectives: (n, K, 6) raw objectives.
-            failed: (n, K), true for a simulation without a result.
-
-        Returns:
-            Geometric means over the scenarios, of the aggregates if there are worlds; a row is +inf
-            if
-            one is missing.
+        These depend on no preference, so neither does the path of such a search.
         """
+        if not METHODS[self.search.name].multi_objective:
+            return fitness
         if self.worlds is None:
             return objective_vectors(objectives, failed)
-        return self.worlds.objective_vectors(objectives, failed)
+        return objective_vectors(objectives, failed, aggregate=self.worlds.aggregated)
 
     def resolved(self) -> JobSpec:
         """Return the job with scenarios, preference, variables and optimizer written out."""

@@ -11,12 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from gaitswarm.services.optimizer.jobs.preference import (
-    Judgement,
-    Preference,
-    geometric_mean,
-    log_utilities,
-)
+from gaitswarm.services.optimizer.jobs.preference import Judgement, geometric_mean
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
@@ -25,11 +20,6 @@ from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
 Floats = NDArray[np.float64]
 
 Aggregate = Literal["mean", "quantile", "worst", "cvar"]
-
-_ALONE: Final = tuple(
-    Preference(bias=(0.0,) * 5, exponent=tuple(exponent)) for exponent in np.eye(5).tolist()
-)
-"""Preferences that weigh one objective each."""
 
 _EDGE: Final = 1e-9
 """Tolerance in worlds: a share this close to an integer counts as that integer."""
@@ -68,11 +58,7 @@ class TuningWorlds(BaseModel):
         return self
 
     def variables(self) -> tuple[Variable, ...]:
-        """Return the perturbations with their bounds.
-
-        Raises:
-            ValueError: Unknown, repeated or out of bounds. Never for a validated set.
-        """
+        """Return the perturbations with their bounds. Raises ValueError, not once validated."""
         perturbations = {variable.name: variable for variable in PERTURBATIONS}
         chosen = PERTURBATIONS if self.ranges is None else self.ranges
         variables: dict[str, Variable] = {}
@@ -96,44 +82,21 @@ class TuningWorlds(BaseModel):
         return _drawn(self)
 
     def judged(self, log_utilities: Floats) -> Judgement:
-        """Judge designs by the geometric mean of the aggregates (eq. 4.2).
-
-        Args:
-            log_utilities: (n, K W) logarithms, worlds varying fastest, +inf for a failed
-            simulation.
-        """
+        """Judge designs by the geometric mean of `aggregated` (eq. 4.2)."""
         logarithms = self.aggregated(log_utilities)
         return Judgement(geometric_mean(logarithms), log_utilities)
 
     def aggregated(self, log_utilities: Floats) -> Floats:
-        """Aggregate utilities over worlds, by scenario; a failure is infinitely bad.
+        """Return (n, K) logarithms of utilities over worlds, by scenario.
 
-        Args:
-            log_utilities: (n, K W), as in `judged`.
-
-        Returns:
-            (n, K) logarithms; +inf for too many failures: more than 1 - `level` of the worlds for a
-            quantile, any failure for the others.
+        +inf for too many failures: more than 1 - `level` of the worlds for a quantile, any failure
+        for the others. log_utilities: (n, K W), worlds varying fastest, +inf after a failure.
         """
         # Not -1: the number of scenarios cannot be inferred from an empty array.
         designs, walks = log_utilities.shape
         by_scenario = log_utilities.reshape(designs, walks // self.count, self.count)
         rows = [[self._aggregate(worlds) for worlds in row] for row in by_scenario.tolist()]
         return np.array(rows, dtype=np.float64).reshape(by_scenario.shape[:2])
-
-    def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """Return each design's (n, 5) objectives f1 to f5 over all worlds and scenarios.
-
-        Objective m is the fitness under a preference that weighs it alone without bias. Each
-        objective is aggregated separately: the worst world of one may be the best of another.
-        """
-        columns = [
-            geometric_mean(self.aggregated(log_utilities(objectives, failed, alone)))
-            for alone in _ALONE
-        ]
-        vectors = np.stack(columns, axis=1)
-        vectors[~np.isfinite(vectors).all(axis=1)] = math.inf
-        return vectors
 
     def _aggregate(self, logarithms: Sequence[float]) -> float:
         ordered = sorted(logarithms, reverse=True)

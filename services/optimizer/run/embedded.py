@@ -6,12 +6,12 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from gaitswarm.services.optimizer.errors import GaitswarmError, LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
+from gaitswarm.services.optimizer.jobs.listing import Page, every
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from gaitswarm.services.optimizer.run.execution import (
     Heartbeat,
@@ -54,7 +54,7 @@ _TAKEN: Final = f"{_LOST}; following it there"
 _FREE: Final = "no other process holds the job now; continuing it here"
 
 
-def run_embedded(
+def run_embedded(  # noqa: C901 - one loop
     store: Store,
     evaluator: Evaluator | Callable[[], Evaluator],
     job: str | Claim,
@@ -74,123 +74,87 @@ def run_embedded(
     expires, continue the job here.
     """
     claim = None if isinstance(job, str) else job
-    begun = store.job(job) if isinstance(job, str) else job.job
-    run = _EmbeddedRun(
-        store,
-        evaluator,
-        begun,
-        on_commit or (lambda *_: None),
-        on_retry,
-        on_follow or (lambda _: None),
-        on_news or (lambda _: None),
-        stop or threading.Event(),
-        accepts_changes,
-        cache,
-        runner=runner_name() if claim is None else claim.runner,
-        seen=(begun.progress.iterations if followed_iterations is None else followed_iterations)
-        - 1,
-    )
-    return run.to_the_end(claim)
+    latest = store.job(job) if isinstance(job, str) else job.job
+    job_id = latest.id
+    runner = runner_name() if claim is None else claim.runner
+    stop = stop or threading.Event()
+    seen = (latest.progress.iterations if followed_iterations is None else followed_iterations) - 1
+    tell, news, following = on_news or (lambda _: None), _HELD, False
 
+    def committed(done: CompletedIteration, state: JobState) -> None:
+        nonlocal seen
+        seen = done.iteration
+        if on_commit is not None:
+            on_commit(done, state)
 
-@dataclass(slots=True)
-class _EmbeddedRun:
-    """job: as last read; seen: index of the last iteration reported to a callback."""
+    def later(_: object) -> Page[Iteration]:
+        return store.iterations(job_id, after=seen)
 
-    store: Store
-    evaluator: Evaluator | Callable[[], Evaluator]
-    job: Job
-    on_commit: OnCommit
-    on_retry: OnRetry | None
-    on_follow: OnFollow
-    on_news: OnNews
-    stop: threading.Event
-    accepts_changes: bool
-    cache: bool
-    runner: str
-    seen: int
-    news: str = field(default=_HELD, init=False)
-    following: bool = field(default=False, init=False)
+    def catch_up() -> None:
+        nonlocal seen
+        for iteration in every(later):
+            seen = iteration.index
+            if on_follow is not None:
+                on_follow(iteration)
 
-    def to_the_end(self, claim: Claim | None) -> Job:
-        while self.job.state in _UNDER_WAY and not self.stop.is_set():
-            if claim is None:
-                claim = self.store.claim(
-                    self.runner, lease_seconds=EMBEDDED_LEASE_SECONDS, job_id=self.job.id
-                )
-            if claim is None:
-                self._follow()
-            else:
-                self._run(claim)
-                claim = None
-        if claim is not None:
-            with suppress(LeaseLost):
-                self.store.release(claim, JobState.QUEUED)
-            self.job = self.store.job(self.job.id)
-        if self.job.state.terminal and self.seen + 1 < self.job.progress.iterations:
-            # The lease was lost, and the job ended elsewhere before the next poll.
-            self.on_news(_LOST)
-            self._catch_up()
-        if self.job.state.terminal:
-            self.store.verify()
-        return self.job
-
-    def _run(self, claim: Claim) -> None:
-        self._catch_up()
-        if self.following:
-            self.on_news(_FREE)
+    while latest.state in _UNDER_WAY and not stop.is_set():
+        claim = claim or store.claim(runner, lease_seconds=EMBEDDED_LEASE_SECONDS, job_id=job_id)
+        if claim is None:
+            # The job first: the iterations read next include all that it counts.
+            latest = store.job(job_id)
+            if latest.state in _UNDER_WAY and not following:
+                tell(news)
+                following = True
+            catch_up()
+            if latest.state in _UNDER_WAY:
+                _pause(stop)
+            continue
+        catch_up()
+        if following:
+            tell(_FREE)
         try:
-            evaluator = self._opened(claim)
+            opened = _opened(store, evaluator, claim) if callable(evaluator) else evaluator
         except EvaluationStopped:
-            self.job = self.store.job(self.job.id)
-            return
-        around = RunContext(
-            self.store,
-            evaluator,
+            latest, claim = store.job(job_id), None
+            continue
+        context = RunContext(
+            store,
+            opened,
             lease_seconds=EMBEDDED_LEASE_SECONDS,
-            on_commit=self._committed,
-            on_retry=self.on_retry,
-            accepts_changes=self.accepts_changes,
-            cache=self.cache,
+            on_commit=committed,
+            on_retry=on_retry,
+            accepts_changes=accepts_changes,
+            cache=cache,
         )
-        self.job = run_claim(claim, around, self.stop)
+        latest, claim = run_claim(claim, context, stop), None
         # A new holder has taken the job from this process.
-        self.news, self.following = _TAKEN, False
+        news, following = _TAKEN, False
+    if claim is not None:
+        with suppress(LeaseLost):
+            store.release(claim, JobState.QUEUED)
+        latest = store.job(job_id)
+    if latest.state.terminal:
+        if seen + 1 < latest.progress.iterations:
+            # The lease was lost, and the job ended elsewhere before the next poll.
+            tell(_LOST)
+            catch_up()
+        store.verify()
+    return latest
 
-    def _opened(self, claim: Claim) -> Evaluator:
-        """Open the evaluator, keeping the lease meanwhile; queue the job on failure."""
-        if not callable(self.evaluator):
-            return self.evaluator
-        try:
-            with Heartbeat(self.store, claim, lease_seconds=EMBEDDED_LEASE_SECONDS):
-                return self.evaluator()
-        except BaseException:
-            with suppress(GaitswarmError):
-                self.store.release(claim, JobState.QUEUED)
-            raise
 
-    def _committed(self, done: CompletedIteration, state: JobState) -> None:
-        self.seen = done.iteration
-        self.on_commit(done, state)
+def _opened(store: Store, evaluator: Callable[[], Evaluator], claim: Claim) -> Evaluator:
+    """Open the evaluator, keeping the lease meanwhile; queue the job on failure."""
+    try:
+        with Heartbeat(store, claim, lease_seconds=EMBEDDED_LEASE_SECONDS):
+            return evaluator()
+    except BaseException:
+        with suppress(GaitswarmError):
+            store.release(claim, JobState.QUEUED)
+        raise
 
-    def _follow(self) -> None:
-        # The job first: the iterations read next include all that it counts.
-        self.job = self.store.job(self.job.id)
-        if self.job.state in _UNDER_WAY and not self.following:
-            self.on_news(self.news)
-            self.following = True
-        self._catch_up()
-        if self.job.state in _UNDER_WAY:
-            # `stop.wait` would hold the lock that a signal handler takes to set `stop`.
-            until = time.monotonic() + _POLL_SECONDS
-            while time.monotonic() < until and not self.stop.is_set():
-                time.sleep(_GLANCE)
 
-    def _catch_up(self) -> None:
-        more = True
-        while more:
-            page = self.store.iterations(self.job.id, after=self.seen)
-            for iteration in page.items:
-                self.seen = iteration.index
-                self.on_follow(iteration)
-            more = page.next is not None
+def _pause(stop: threading.Event) -> None:
+    # `stop.wait` would hold the lock that a signal handler takes to set `stop`.
+    until = time.monotonic() + _POLL_SECONDS
+    while time.monotonic() < until and not stop.is_set():
+        time.sleep(_GLANCE)

@@ -28,6 +28,9 @@ REQUEST_ID: Final = "X-Request-ID"
 _ACCEPTABLE_ID: Final = re.compile(r"^[A-Za-z0-9_.-]{1,128}$")
 
 _METHODS: Final = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+_HOST: Final = re.compile(r"(?:\[([0-9a-f:.]+)\]|([^\[\]:]*))(?::[0-9]*)?")
+"""An IPv6 address in brackets or a name, and a port."""
+
 _SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 _NO_ROUTE: Final = "none"
@@ -71,7 +74,8 @@ class ResponseMiddleware:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        given = Headers(scope=scope).get(REQUEST_ID, "")
+        sent = Headers(scope=scope)
+        given = sent.get(REQUEST_ID, "")
         request_id = given if _ACCEPTABLE_ID.match(given) else uuid.uuid4().hex
         received_at = time.perf_counter()
         started = False
@@ -82,6 +86,9 @@ class ResponseMiddleware:
                 started = True
                 headers = MutableHeaders(scope=message)
                 headers[REQUEST_ID] = request_id
+                if "content-length" in sent and "transfer-encoding" in sent:
+                    # A proxy may read the rest of the connection differently (RFC 9112, 6.1).
+                    headers["Connection"] = "close"
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
                 self._count(scope, message["status"], time.perf_counter() - received_at)
@@ -144,7 +151,8 @@ class OriginMiddleware:
         return None
 
     def _is_own(self, host: str) -> bool:
-        name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
+        match = _HOST.fullmatch(host)
+        name = "" if match is None else match[1] or match[2]
         if not self._names.isdisjoint((host, name)):
             return True
         try:

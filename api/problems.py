@@ -224,7 +224,8 @@ async def _on_invalid(request: Request, raised: Exception) -> Response:
     if any(entry["type"] == "json_invalid" for entry in entries):
         entry = entries[0]
         reason = entry.get("ctx", {}).get("error", "it cannot be parsed")
-        message = f"{reason} at character {entry['loc'][-1]}; send one JSON object"
+        place = f" at character {entry['loc'][-1]}" if entry["loc"][-1] else ""
+        message = f"{reason}{place}; send one JSON object"
         errors = [FieldErrorView(field="body", message=message)]
         return problem(request.url.path, "malformed-json", f"body: {message}", errors=errors)
     errors = _field_errors(entries, error.body)

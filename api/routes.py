@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from types import NoneType
 from typing import Annotated, Any, Final, get_args
@@ -16,6 +17,7 @@ from anyio.to_thread import run_sync
 from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Response, status
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, StreamingResponse
+from fastapi.routing import APIRoute
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from gaitswarm.api.access import (
@@ -56,7 +58,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 from gaitswarm.services.optimizer.jobs.notification import check_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.input import with_known_keys
+from gaitswarm.sim.input import numbers_from_booleans, unique_names, with_known_keys
 from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 from gaitswarm.views.base import PREFIX
 from gaitswarm.views.job import JobView
@@ -156,7 +158,10 @@ def validated(model: Any, name: str) -> Callable[..., Any]:
 def _validated(model: Any, adapter: TypeAdapter[Any], document: Any) -> Any:
     _check_bounds(document)
     try:
-        return adapter.validate_python(document)
+        value = adapter.validate_python(document)
+        for where in numbers_from_booleans(document, adapter.dump_python(value)):
+            raise _refusal(where, "must be a number", document)
+        return value
     except ValidationError as error:
         entries = with_known_keys(error.errors(include_url=False), model)
         raise RequestValidationError(
@@ -405,7 +410,34 @@ def _job_view(service: JobService, response: Response, job: Job, is_new: bool) -
     return job_view(service, job)
 
 
-router: Final = APIRouter()
+class _StrictRequest(Request):
+    """A request whose JSON has no name twice in an object."""
+
+    async def json(self) -> Any:
+        try:
+            if not hasattr(self, "_json"):
+                self._json = json.loads(await self.body(), object_pairs_hook=unique_names)
+            return self._json
+        except json.JSONDecodeError:
+            raise
+        except ValueError as error:
+            # FastAPI answers no other error by its text.
+            raise json.JSONDecodeError(str(error), "", 0) from error
+
+
+class _Route(APIRoute):
+    """A route for such requests."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        handler = super().get_route_handler()
+
+        async def handle(request: Request) -> Response:
+            return await handler(_StrictRequest(request.scope, request.receive))
+
+        return handle
+
+
+router: Final = APIRouter(route_class=_Route)
 
 
 @router.post(

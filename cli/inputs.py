@@ -13,6 +13,7 @@ from gaitswarm.cli.options import Place, full_id
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.sim.controllers import CONTROLLERS, Controller, ControllerName
 from gaitswarm.sim.gait_variables import GAIT_VARIABLES
+from gaitswarm.sim.input import unique_names
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.sim.variables import Variable, VariableCatalogue
@@ -52,7 +53,7 @@ def read_json_object(path: Path, option: str) -> dict[str, Any]:
 
 def _parsed(content: str | bytes, where: str, option: str) -> dict[str, Any]:
     try:
-        value = json.loads(content, object_pairs_hook=_without_repeats)
+        value = json.loads(content, object_pairs_hook=unique_names)
     except RecursionError as error:
         raise InvalidRequest(f"{where}is nested too deeply", field=option) from error
     except ValueError as error:
@@ -60,15 +61,6 @@ def _parsed(content: str | bytes, where: str, option: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InvalidRequest(f"{where}must be one JSON object, {{...}}", field=option)
     return value
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Reject objects with repeated names."""
-    names = [name for name, _ in pairs]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"{name!r} occurs twice in one object")
-    return dict(pairs)
 
 
 def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
+from collections.abc import Iterator
 from ipaddress import ip_address, ip_network
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -15,6 +17,7 @@ from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANT
 from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.sim.compiler.cache import DEFAULT_SIZE
 from gaitswarm.sim.input import message_of
+from gaitswarm.sim.near_names import nearest
 
 
 def place_of(iteration: int, particle: int) -> str:
@@ -30,6 +33,9 @@ def read_place(text: str, *, field: str) -> tuple[int, int]:
             "must be the iteration and the number of a design in it, such as 24.7", field=field
         )
     return int(found[1]), int(found[2])
+
+
+_OF_TESTS: Final = re.compile(r"GAITSWARM_(REQUIRE_|SCREENSHOTS)")
 
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
@@ -291,6 +297,8 @@ def read_settings(**options: Any) -> Settings:
     """Read settings from the environment, overridden by options of a command."""
     given = {name: value for name, value in options.items() if value is not None}
     variables = {name: os.environ.get(variable_of(name)) for name in Settings.model_fields}
+    for problem in _unknown_variables():
+        warnings.warn(problem, stacklevel=1)
     try:
         return Settings(**{n: v for n, v in variables.items() if v} | given)
     except ValidationError as error:
@@ -301,6 +309,16 @@ def read_settings(**options: Any) -> Settings:
         (field, message), *others = problems
         more = "".join(f"; {name}: {text}" for name, text in others)
         raise InvalidRequest(message + more, field=field) from error
+
+
+def _unknown_variables() -> Iterator[str]:
+    """Yield what is wrong with variables that no setting has, such as misspelt ones."""
+    known = {variable_of(name) for name in Settings.model_fields}
+    for name in sorted(os.environ):
+        if name.startswith("GAITSWARM_") and name not in known and not _OF_TESTS.match(name):
+            near = nearest(name.removeprefix("GAITSWARM_"), Settings.model_fields)
+            advice = f"did you mean {variable_of(near)}?" if near else "docs/settings.md has all"
+            yield f"{name} is no setting and has no effect; {advice}"
 
 
 def default_database() -> Path:

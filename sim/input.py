@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
@@ -190,3 +191,33 @@ def _alternatives(annotation: Any, tag: str | None = None) -> Iterator[tuple[str
 
 def _is_model(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a JSON document; raise ValueError if a name occurs twice in it."""
+    names = dict(pairs)
+    if len(names) < len(pairs):
+        counts = Counter(name for name, _ in pairs)
+        raise ValueError(f"{counts.most_common(1)[0][0]!r} occurs twice in one object")
+    return names
+
+
+def numbers_from_booleans(document: Any, value: Any) -> Iterator[tuple[str | int, ...]]:
+    """Yield where a document has true or false, of which validation has made a number.
+
+    Args:
+        document: As parsed from JSON.
+        value: What it was validated to, with models as dictionaries.
+    """
+    if isinstance(document, bool):
+        if type(value) in (int, float):
+            yield ()
+        return
+    pairs: Iterable[tuple[str | int, Any, Any]] = ()
+    if isinstance(document, dict) and isinstance(value, dict):
+        pairs = ((name, document[name], value[name]) for name in document.keys() & value.keys())
+    elif isinstance(document, list) and isinstance(value, list | tuple):
+        pairs = ((i, *both) for i, both in enumerate(zip(document, value, strict=False)))
+    for name, part, inner in pairs:
+        for where in numbers_from_booleans(part, inner):
+            yield (name, *where)

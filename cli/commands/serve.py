@@ -106,7 +106,6 @@ def serve(
     from gaitswarm.api.app import create_app
     from gaitswarm.api.page import is_built
     from gaitswarm.api.server import ApiServer
-    from gaitswarm.cli.commands.serve import log_to_stderr
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
@@ -153,7 +152,6 @@ def runner(options: RunnerOptions) -> None:
     Running jobs then commit their current iterations and return to the queue; a second signal
     discards these iterations.
     """
-    from gaitswarm.cli.commands.serve import log_to_stderr
     from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
     from gaitswarm.services.runtime import stop_on_signals
     from gaitswarm.settings import read_settings

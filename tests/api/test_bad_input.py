@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from collections.abc import Iterator
 from typing import Any
 
@@ -113,6 +114,41 @@ def test_a_body_that_is_not_json_is_refused(client: httpx2.Client, body: str) ->
 
     problem = refused(answer, 400)
     assert problem["type"] == "urn:gaitswarm:problem:malformed-json"
+
+
+@pytest.mark.parametrize("body", ['{"name": "a", "name": "b"}', '{"fixed": {"S1": 1, "S1": 2}}'])
+def test_a_name_twice_in_an_object_is_refused(client: httpx2.Client, body: str) -> None:
+    answer = client.post("/v1/jobs", content=body, headers={"Content-Type": "application/json"})
+
+    assert "occurs twice in one object" in refused(answer, 400)["detail"]
+
+
+@pytest.mark.parametrize(
+    ("document", "field"),
+    [
+        ({"seed": True}, "seed"),
+        ({"fixed": {"FI1R": True}}, "fixed.FI1R"),
+        ({"optimizer": {"name": "pso", "cognitive": True}}, "optimizer.cognitive"),
+        ({"scenarios": [{**OWN, "cycle_time": True}]}, "scenarios.0.cycle_time"),
+    ],
+)
+def test_true_and_false_are_no_numbers(
+    client: httpx2.Client, document: dict[str, Any], field: str
+) -> None:
+    (error,) = refused(client.post("/v1/jobs", json=document), 422)["errors"]
+
+    assert error == {"field": field, "message": "must be a number"}
+
+
+def test_a_request_with_two_lengths_is_the_last_of_its_connection(client: httpx2.Client) -> None:
+    url = client.base_url
+    lengths = b"Content-Length: 5\r\nTransfer-Encoding: chunked"
+    request = b"POST /v1/estimates HTTP/1.1\r\nHost: localhost\r\n" + lengths
+    with socket.create_connection((url.host, url.port or 80), timeout=10.0) as connection:
+        connection.sendall(request + b"\r\n\r\n0\r\n\r\n")
+        answer = b"".join(iter(lambda: connection.recv(65536), b""))
+
+    assert answer.startswith(b"HTTP/1.1 ") and b"\r\nconnection: close\r\n" in answer
 
 
 @pytest.mark.parametrize("body", ["[]", '"job"', "3", "null"])

@@ -80,7 +80,7 @@ def test_a_server_is_reached_by_its_addresses_and_as_localhost(
 
 
 @pytest.mark.parametrize(
-    "host", ["localhost.evil.example", "127.0.0.1.evil.example", "", "[", "::"]
+    "host", ["localhost.evil.example", "127.0.0.1.evil.example", "", "[", "::", "[::1].evil"]
 )
 def test_what_only_looks_like_its_name_is_refused(client: httpx2.Client, host: str) -> None:
     assert client.get("/v1/healthz", headers={"Host": host}).status_code == 421

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -66,3 +67,18 @@ def test_without_a_home_directory_only_a_named_database_will_do(
     assert read_settings(db="/mine.db").database == "/mine.db"
     with pytest.raises(StoreUnavailable, match="GAITSWARM_DB"):
         _ = read_settings().database
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("GAITSWARM_EVALUATR", "did you mean GAITSWARM_EVALUATOR?"),
+        ("GAITSWARM_XYZ", "docs/settings.md"),
+    ],
+)
+def test_a_variable_that_is_no_setting_is_reported(
+    monkeypatch: pytest.MonkeyPatch, name: str, advice: str
+) -> None:
+    monkeypatch.setenv(name, "ray")
+    with pytest.warns(UserWarning, match=rf"^{name} is no setting .*{re.escape(advice)}"):
+        read_settings()

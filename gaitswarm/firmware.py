@@ -20,8 +20,7 @@ from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.firmware import (
-    BUDGET,
+from gaitswarm.sim.firmware.folder import (
     FORMAT,
     MANIFEST,
     Firmware,
@@ -29,6 +28,7 @@ from gaitswarm.sim.firmware import (
     check_table_bits,
     firmware_of,
 )
+from gaitswarm.sim.firmware.microcontroller import BUDGET
 from gaitswarm.sim.input import Line
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
 from gaitswarm.views.job import BestView

@@ -46,7 +46,7 @@ from gaitswarm.services.optimizer.analysis.reference import (
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
-from gaitswarm.sim.firmware import parsed_table_bits
+from gaitswarm.sim.firmware.folder import parsed_table_bits
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.views.catalogue import (
     CaseView,

@@ -25,9 +25,10 @@ from gaitswarm.services.optimizer.views import Request, View
 from gaitswarm.sim.controllers.joint_pd import LARGEST_GAIN
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.proposal.apart import propose_apart, walking_proposal
-from gaitswarm.sim.proposal.drive import GRAVITY, ActuatorChoice
+from gaitswarm.sim.proposal.document import propose_apart, walking_proposal
+from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.frame import Axis, Frame
 from gaitswarm.sim.proposal.gait import walk_of_robot
 from gaitswarm.sim.proposal.legs import reach_below

@@ -432,7 +432,7 @@ def firmware(
 
 def _bits(text: str) -> tuple[int, int]:
     from gaitswarm.errors import simulation_errors
-    from gaitswarm.sim.firmware import parsed_table_bits
+    from gaitswarm.sim.firmware.folder import parsed_table_bits
 
     with simulation_errors("table_bits"):
         return parsed_table_bits(text)

@@ -1,16 +1,18 @@
-"""A proposed robot as files: robot.toml with a comment on each guess, and robot.urdf."""
+"""A proposed robot as files, made in a limited process for untrusted URDFs."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import takewhile
 from typing import Any, Final
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from gaitswarm.sim.errors import ProcessEnded, RobotFileError, SimulationInputError
+from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
 from gaitswarm.sim.proposal.drive import (
     ACTUATOR_NOTES,
     ActuatorChoice,
@@ -24,7 +26,6 @@ from gaitswarm.sim.proposal.drive import (
     proposed_control,
     quoted,
 )
-from gaitswarm.sim.proposal.feet import MeshBounds, no_meshes
 from gaitswarm.sim.proposal.frame import (
     AS_IT_IS,
     Frame,
@@ -33,10 +34,19 @@ from gaitswarm.sim.proposal.frame import (
     turned,
     with_elements,
 )
-from gaitswarm.sim.proposal.gait import alternating_phases, propose_scenarios
-from gaitswarm.sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
+from gaitswarm.sim.proposal.gait import alternating_phases, propose_scenarios, walk_within_reach
+from gaitswarm.sim.proposal.legs import (
+    FoundLeg,
+    FoundLegs,
+    MeshBounds,
+    chain_leg,
+    find_legs,
+    no_meshes,
+)
 from gaitswarm.sim.proposal.stance import Stance, choose_stance
+from gaitswarm.sim.robot.bounds import check_urdf
 from gaitswarm.sim.robot.elements import by_line
+from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.urdf import parse_urdf, unphysical
 
 _LEVEL: Final = 0.2
@@ -55,7 +65,7 @@ def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLeg
     text = turned(urdf, root, [root, *others], frame)
     tree = parse_urdf(text)
     legs_found = find_legs(tree, upright=frame != AS_IT_IS, bounds=bounds)
-    legs = [chain_leg(tree, leg.joints, leg.end) for leg in legs_found.legs]
+    legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in legs_found.legs]
     level = float(f"{np.mean([leg.hip[2] for leg in legs]):.3g}")
     if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):
         return text, _at_their_lowest(text, legs_found), []
@@ -67,34 +77,32 @@ def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLeg
 
 def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
     """Put ends of legs that only shapes indicate at their lowest point in the stance."""
-    if not any(len(leg.ends) for leg in found.legs):
+    if not any(len(leg.end.others) for leg in found.legs):
         return found
     tree = parse_urdf(urdf)
-    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
+    legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in found.legs]
     lowered = []
     for leg, chain, angles in zip(found.legs, legs, choose_stance(legs).angles, strict=True):
         low = chain.foot(angles)[2] - _LOWER * sum(chain.lengths)
-        heights = [replace(chain, end=end).foot(angles)[2] for end in leg.ends]
-        end = leg.end
+        heights = [replace(chain, end=end).foot(angles)[2] for end in leg.end.others]
         if heights and min(heights) < low:
-            x, y, z = leg.ends[int(np.argmin(heights))].tolist()
-            end = (x, y, z)
-        lowered.append(replace(leg, end=end))
+            lowest = leg.end.others[int(np.argmin(heights))]
+            leg = replace(leg, end=replace(leg.end, at=lowest))  # noqa: PLW2901
+        lowered.append(leg)
     return replace(found, legs=tuple(lowered))
 
 
 def with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
-    feet = [leg.foot or f"{leg.link}_foot" for leg in legs]
-    missing = [(leg, foot) for leg, foot in zip(legs, feet, strict=True) if leg.foot is None]
-    if not missing:
-        return urdf, feet
+    feet = [leg.end.foot or f"{leg.link}_foot" for leg in legs]
     lines = []
-    for leg, foot in missing:
-        lines += [
-            f"  <link name={quoteattr(foot)}/>",
-            *fixed_joint(f"{foot}_fixed", leg.link, foot, " ".join(map(repr, leg.end))),
-        ]
-    return with_elements(urdf, lines), feet
+    for leg, foot in zip(legs, feet, strict=True):
+        if leg.end.foot is None:
+            at = " ".join(map(repr, leg.end.at.tolist()))
+            lines += [
+                f"  <link name={quoteattr(foot)}/>",
+                *fixed_joint(f"{foot}_fixed", leg.link, foot, at),
+            ]
+    return with_elements(urdf, lines) if lines else urdf, feet
 
 
 _PREFERENCE: Final = "C"
@@ -153,7 +161,7 @@ def propose_robot(
     text, feet = with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
-    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
+    legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in found.legs]
     with by_line(urdf):
         stance = choose_stance(legs)
     standing = [
@@ -162,7 +170,7 @@ def propose_robot(
     ]
     drives = propose_drives(tree, joints, legs, stance)
     kind = chosen_kind(actuator, drives)
-    sole, sole_note = propose_sole(tree, legs, stance, [leg.sole for leg in found.legs])
+    sole, sole_note = propose_sole(tree, legs, stance, [leg.end.sole for leg in found.legs])
     toml = "\n".join(
         [
             *_head(name, len(legs), tree.total_mass),
@@ -180,7 +188,7 @@ def propose_robot(
     notes = [*moved, _TWO_LEGS] if len(legs) == 2 else moved
     if frame.forward is None and sideways(legs, stance.angles):
         notes.append(_SIDEWAYS)
-    notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
+    notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.end.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes += [
         ACTUATOR_NOTES[kind],
@@ -277,3 +285,70 @@ def _leg_names(legs: Sequence[FoundLeg]) -> list[str]:
 def _shared_beginning(names: Sequence[str]) -> str:
     alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in alike)
+
+
+SECONDS: Final = 40.0
+"""Time limit of a proposal [s]; one takes tenths of a second, the first a second more."""
+
+CPU_SECONDS: Final = 20
+
+MEMORY: Final = 2 << 30
+"""Address space of a proposing process [B], of which it needs a tenth."""
+
+PROCESSES: Final = LimitedProcesses(
+    "gaitswarm.sim.proposal.document",
+    count=1,
+    seconds=SECONDS,
+    cpu_seconds=CPU_SECONDS,
+    memory=MEMORY,
+)
+
+
+def walking_proposal(
+    urdf: str,
+    name: str,
+    actuator: ActuatorChoice = "auto",
+    frame: Frame = AS_IT_IS,
+    bounds: MeshBounds = no_meshes,
+) -> Proposal:
+    """Propose a robot, and check that it can be used and that its legs reach."""
+    proposal = propose_robot(urdf, name, actuator, frame, bounds)
+    robot = parse_robot(proposal.toml, proposal.urdf)
+    with by_line(urdf):
+        fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
+    return proposal.with_guesses(
+        [note for _, note in fitted if note],
+        job={**proposal.job, "scenarios": [walk for walk, _ in fitted]},
+    )
+
+
+def propose_apart(
+    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+) -> Proposal:
+    """Propose a robot in another process with limits of time, processor and memory."""
+    check_urdf(urdf)
+    try:
+        made = PROCESSES.ask(
+            {"urdf": urdf, "name": name, "actuator": actuator, "frame": asdict(frame)}
+        )
+    except ProcessEnded as error:
+        raise RobotFileError(
+            f"robot.urdf: cannot propose a robot.toml: this {error}; write one by hand, as"
+            " docs/robots.md explains"
+        ) from error
+    except SimulationInputError as error:
+        raise RobotFileError(str(error)) from error
+    return Proposal(
+        made["toml"], made["urdf"], made["job"], tuple(made["guesses"]), tuple(made["problems"])
+    )
+
+
+def _answer(request: Document) -> Document:
+    made = walking_proposal(
+        request["urdf"], request["name"], request["actuator"], Frame(**request["frame"])
+    )
+    return asdict(made)
+
+
+if __name__ == "__main__":
+    serve(_answer)

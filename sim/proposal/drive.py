@@ -11,14 +11,12 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
+from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
 from gaitswarm.sim.robot.actuators import ActuatorKind
 from gaitswarm.sim.robot.joints import Joint
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.urdf import Urdf
-
-GRAVITY: Final = 9.81
-"""[m/s2]"""
 
 _ENOUGH, _PLAUSIBLE = 2.0, 60.0
 """Plausible torques of a URDF, relative to what standing on half the legs takes."""
@@ -167,9 +165,22 @@ _STIFFNESS, _DAMPING = (0.5, 10.0), (0.005, 0.1)
 
 def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     """Return lines of robot.toml: actuators, battery, command and sensors."""
-    if kind == "torque":
-        return [*_torque_actuators(drives), *_torque_electronics(drives)]
-    return [*_dc_motors(drives), *_dc_electronics(drives)]
+    largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / _VOLTAGE
+    torque = kind == "torque"
+    return [
+        *(_torque_actuators(drives) if torque else _dc_motors(drives)),
+        "",
+        "[supply]                            # guessed",
+        f"voltage = {_VOLTAGE}                 # V, open circuit",
+        "resistance = 0.01                   # ohm",
+        *(_TORQUE_COMMAND if torque else _PWM),
+        "",
+        "[sensors]                           # 16 bits per turn, 12 bits of current",
+        "angle_counts = 10430.0              # per rad",
+        "angle_step = 1",
+        f"current_counts = {_LARGEST_CODE / largest:.6g}    # an A",
+        "current_step = 16",
+    ]
 
 
 def proposed_control(
@@ -256,46 +267,20 @@ def _torque_actuators(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     return lines
 
 
-def _torque_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
-    return [
-        "",
-        "[supply]                            # guessed",
-        f"voltage = {_VOLTAGE}                 # V, open circuit",
-        "resistance = 0.01                   # ohm",
-        "",
-        "[torque_command]",
-        "rate = 1000                         # Hz, of the joint PD in the actuators; guessed",
-        "",
-        *_sensors(max(d.torque * d.speed for of_leg in drives for d in of_leg) / _VOLTAGE),
-    ]
+_TORQUE_COMMAND: Final = (
+    "",
+    "[torque_command]",
+    "rate = 1000                         # Hz, of the joint PD in the actuators; guessed",
+)
 
-
-def _dc_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
-    largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / _VOLTAGE
-    return [
-        "",
-        "[supply]                            # guessed",
-        f"voltage = {_VOLTAGE}                 # V, open circuit",
-        "resistance = 0.01                   # ohm",
-        f"nominal_voltage = {_VOLTAGE}         # V",
-        "",
-        "[pwm]                               # 10 bits and a sign",
-        "counts = 1023",
-        f"full_scale = {_VOLTAGE}              # V",
-        "step = 1",
-        "",
-        *_sensors(largest),
-    ]
-
-
-def _sensors(largest: float) -> list[str]:
-    return [
-        "[sensors]                           # 16 bits per turn, 12 bits of current",
-        "angle_counts = 10430.0              # per rad",
-        "angle_step = 1",
-        f"current_counts = {_LARGEST_CODE / largest:.6g}    # an A",
-        "current_step = 16",
-    ]
+_PWM: Final = (
+    f"nominal_voltage = {_VOLTAGE}         # V",
+    "",
+    "[pwm]                               # 10 bits and a sign",
+    "counts = 1023",
+    f"full_scale = {_VOLTAGE}              # V",
+    "step = 1",
+)
 
 
 def quoted(text: str) -> str:

@@ -12,7 +12,7 @@ from gaitswarm.sim.errors import BeyondJointLimit, RobotFileError, UnreachablePo
 from gaitswarm.sim.gait.gaits import GAITS, lags_of
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.input import message_of
-from gaitswarm.sim.proposal.drive import GRAVITY
+from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.legs import ChainLeg

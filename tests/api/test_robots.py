@@ -10,7 +10,7 @@ import pytest
 
 from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.limited_process import LimitedProcesses
-from gaitswarm.sim.proposal import apart
+from gaitswarm.sim.proposal import document
 from gaitswarm.sim.proposal.document import propose_robot
 from tests.examples.hostile import chain
 from tests.robots.test_proposal import STATUE, dog
@@ -117,9 +117,9 @@ def test_a_proposal_that_takes_too_much_is_ended(
     client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     processes = LimitedProcesses(
-        "gaitswarm.sim.proposal.apart", count=1, seconds=0.01, cpu_seconds=1, memory=2 << 30
+        "gaitswarm.sim.proposal.document", count=1, seconds=0.01, cpu_seconds=1, memory=2 << 30
     )
-    monkeypatch.setattr(apart, "PROCESSES", processes)
+    monkeypatch.setattr(document, "PROCESSES", processes)
     with pytest.raises(ProcessEnded):
         processes.ask({"urdf": dog(), "name": "dog", "actuator": "auto"})
     error = refused(client, "drafts", name="dog", urdf=dog())

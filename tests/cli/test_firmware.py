@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.sim.firmware import MANIFEST
+from gaitswarm.sim.firmware.folder import MANIFEST
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK

@@ -10,8 +10,13 @@ import pytest
 from gaitswarm.sim.assembly import control_steps
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName, LookupTable
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.firmware.integers import LawIntegers, in_16_bits, law_integers
-from gaitswarm.sim.firmware.memory import TrajectoryTable, trajectory_table
+from gaitswarm.sim.firmware.microcontroller import (
+    LawIntegers,
+    TrajectoryTable,
+    in_16_bits,
+    law_integers,
+    trajectory_table,
+)
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario

@@ -12,8 +12,7 @@ import pytest
 
 from gaitswarm.firmware import write_firmware
 from gaitswarm.sim.controllers import ControllerName
-from gaitswarm.sim.firmware import BUDGET
-from gaitswarm.sim.firmware.memory import CODE_BYTES
+from gaitswarm.sim.firmware.microcontroller import BUDGET, CODE_BYTES
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from tests.examples.walks import short_walk
 from tests.firmware.conftest import TOOLS, make, published, with_changed_cell

@@ -12,8 +12,7 @@ import pytest
 
 from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.proposal.apart import walking_proposal
-from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.proposal.document import propose_robot, walking_proposal
 from gaitswarm.sim.robot import Robot, parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
 from tests.robots.test_proposal import dog

@@ -151,8 +151,8 @@ def test_a_foot_is_a_link_a_sphere_or_the_far_end_of_the_last_shape(
     foot: str, name: str, end: float, sole: float | None
 ) -> None:
     leg = find_legs(parse_urdf(dog(foot=foot))).legs[0]
-    np.testing.assert_allclose(leg.end, [0.0, 0.0, -end], atol=1e-12)
-    assert leg.sole == sole
+    np.testing.assert_allclose(leg.end.at, [0.0, 0.0, -end], atol=1e-12)
+    assert leg.end.sole == sole
     robot = proposed(dog(foot=foot))
     assert robot.description.legs[0].foot == name
     assert robot.description.legs[0].name == "FL"

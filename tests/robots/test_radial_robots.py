@@ -13,8 +13,7 @@ from gaitswarm.robots import check_robot
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.proposal.apart import walking_proposal
-from gaitswarm.sim.proposal.document import Proposal
+from gaitswarm.sim.proposal.document import Proposal, walking_proposal
 from gaitswarm.sim.robot import Robot, RobotFiles, parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.scenario import Scenario

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from gaitswarm.cli.main import run
-from gaitswarm.sim.proposal.apart import walking_proposal
+from gaitswarm.sim.proposal.document import walking_proposal
 from gaitswarm.sim.robot import parse_robot
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import ARM, dog

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from pydantic import BaseModel
 
-from gaitswarm.evidence.archive import FORMAT, MANIFEST, VERSION, ProvenanceDocument
+from gaitswarm.evidence import FORMAT, MANIFEST, VERSION
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -54,7 +55,7 @@ class CertificateOnPage:
 def page(
     job: Job,
     best: BestView | None,
-    provenance: ProvenanceDocument,
+    provenance: BaseModel,
     figures: Mapping[str, str],
     certificates: Sequence[CertificateOnPage],
     files: Sequence[str],

@@ -21,19 +21,17 @@ from gaitswarm.evidence.archive import (
     CHAIN,
     JOB,
     SUMMARY,
-    Evidence,
-    check_hashes,
-    check_robots,
-    parsed_json,
-    read_evidence,
-)
-from gaitswarm.evidence.contents import (
     WORST,
+    Evidence,
     Place,
     best_of,
     certified_place,
+    check_hashes,
+    check_robots,
     in_double,
     kernels_of,
+    parsed_json,
+    read_evidence,
     row_of,
 )
 from gaitswarm.services.optimizer.analysis.certificate import certificate as certificate_view

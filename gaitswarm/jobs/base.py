@@ -1149,7 +1149,7 @@ class Jobs(ABC):
         Raises:
             Conflict: The job has no committed iteration yet.
         """
-        from gaitswarm.evidence.contents import evidence
+        from gaitswarm.evidence.archive import evidence
 
         return evidence(self._service, job_id)
 

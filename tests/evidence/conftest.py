@@ -16,7 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import MANIFEST, archived
+from gaitswarm.evidence import MANIFEST
+from gaitswarm.evidence.archive import archived
 from gaitswarm.zip_archive import unzipped
 from tests.examples.walks import SHORT_WALK
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.contents import evidence
+from gaitswarm.evidence.archive import evidence
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import open_store

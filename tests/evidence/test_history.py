@@ -12,7 +12,8 @@ import pytest
 
 import gaitswarm
 from gaitswarm.cli.exit_codes import ExitCode
-from gaitswarm.evidence.archive import MANIFEST, archived
+from gaitswarm.evidence import MANIFEST
+from gaitswarm.evidence.archive import archived
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, JOB, Proved, tampered, with_cells

@@ -1,4 +1,4 @@
-"""Output files: atomic replacement, and logs of walks."""
+"""Atomic replacement of output files."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-
-if TYPE_CHECKING:
-    pass
 
 
 @contextmanager

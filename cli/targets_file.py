@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,11 +15,15 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 _NEEDED: Final = ("walk", "controller", "design", "scenario", "quantity", "value", "tolerance")
-_OPTIONAL: Final = ("relative_to", "use")
+_COLUMNS: Final = (*_NEEDED, "relative_to", "use")
 _OF_WALK: Final = ("controller", "design", "scenario")
 
 _LARGEST: Final = 1 << 20
 """Largest accepted table [B]."""
+
+
+class _CellError(Exception):
+    """A column, and the error in its cell."""
 
 
 def read_targets(path: Path) -> dict[str, list[dict[str, Any]]]:
@@ -29,29 +33,6 @@ def read_targets(path: Path) -> dict[str, list[dict[str, Any]]]:
         controller, design and scenario may be empty in its later rows. Files of designs and
         scenarios are relative to the table's folder.
     """
-    walks: dict[str, dict[str, Any]] = {}
-    cells_of: dict[str, dict[str, str]] = {}
-    targets = []
-    for line, row in _rows(path):
-        name = row["walk"]
-        cells = {column: row[column] for column in _OF_WALK}
-        if name in walks:
-            for column, cell in cells.items():
-                if cell not in ("", cells_of[name][column]):
-                    raise _refusal(
-                        path, line, column, f"differs from an earlier row of walk {name!r}"
-                    )
-        else:
-            walks[name] = _walk(path, line, name, cells)
-            cells_of[name] = cells
-        targets.append(_target(path, line, row, walks))
-    if not targets:
-        raise InvalidRequest(f"{path} has no rows", field="targets")
-    return {"walks": list(walks.values()), "targets": targets}
-
-
-def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
-    """Yield line numbers and stripped cells by column."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             text = file.read(_LARGEST + 1)
@@ -60,85 +41,98 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     if len(text) > _LARGEST:
         raise InvalidRequest(f"{path} is larger than {_LARGEST >> 20} MiB", field="targets")
     reader = csv.reader(text.splitlines(), strict=True, skipinitialspace=True)
-    header: list[str] | None = None
     try:
-        for row in reader:
-            cells = [cell.strip() for cell in row]
-            if not any(cells) or cells[0].startswith("#"):
-                continue
-            if header is None:
-                header = _header(path, reader.line_num, cells)
-            elif len(cells) > len(header):
-                raise _refusal(
-                    path, reader.line_num, header[-1], "the line has more cells than the header"
-                )
-            else:
-                named = dict(zip(header, cells, strict=False))
-                yield reader.line_num, dict.fromkeys((*_NEEDED, *_OPTIONAL), "") | named
+        targets = _targets(reader, path.parent)
     except csv.Error as error:
         raise InvalidRequest(f"{path}, line {reader.line_num}: {error}", field="targets") from error
+    except _CellError as error:
+        column, message = error.args
+        raise InvalidRequest(
+            f"{path}, line {reader.line_num}, column {column}: {message}", field="targets"
+        ) from error
+    if not targets["targets"]:
+        raise InvalidRequest(f"{path} has no rows", field="targets")
+    return targets
 
 
-def _header(path: Path, line: int, columns: list[str]) -> list[str]:
-    allowed = (*_NEEDED, *_OPTIONAL)
+def _targets(reader: Iterable[list[str]], folder: Path) -> dict[str, list[dict[str, Any]]]:
+    header: list[str] | None = None
+    first: dict[str, dict[str, str]] = {}
+    walks: dict[str, dict[str, Any]] = {}
+    targets = []
+    for entries in reader:
+        cells = [entry.strip() for entry in entries]
+        if not any(cells) or cells[0].startswith("#"):
+            continue
+        if header is None:
+            header = cells
+            _check_header(header)
+            continue
+        if len(cells) > len(header):
+            raise _CellError(header[-1], "the line has more cells than the header")
+        row = dict.fromkeys(_COLUMNS, "") | dict(zip(header, cells, strict=False))
+        name = row["walk"]
+        if name not in walks:
+            walks[name] = _walk(row, folder)
+            first[name] = row
+        for column in _OF_WALK:
+            if row[column] not in ("", first[name][column]):
+                raise _CellError(column, f"differs from an earlier row of walk {name!r}")
+        targets.append(_target(row, len(walks[name]["scenarios"])))
+    return {"walks": list(walks.values()), "targets": targets}
+
+
+def _check_header(columns: list[str]) -> None:
     for column in columns:
-        if column not in allowed:
-            names = ", ".join(allowed)
-            raise _refusal(path, line, column, f"unknown column; known are {names}")
+        if column not in _COLUMNS:
+            raise _CellError(column, f"unknown column; known are {', '.join(_COLUMNS)}")
         if columns.count(column) > 1:
-            raise _refusal(path, line, column, "duplicate column")
+            raise _CellError(column, "duplicate column")
     for column in _NEEDED:
         if column not in columns:
-            raise _refusal(path, line, column, "missing column")
-    return columns
+            raise _CellError(column, "missing column")
 
 
-def _walk(path: Path, line: int, name: str, cells: Mapping[str, str]) -> dict[str, Any]:
+def _walk(row: Mapping[str, str], folder: Path) -> dict[str, Any]:
     from gaitswarm.sim.calibration import TargetWalk
 
-    for column, cell in cells.items():
-        if not cell:
-            raise _refusal(path, line, column, f"required in the first row of walk {name!r}")
+    for column in _OF_WALK:
+        if not row[column]:
+            raise _CellError(column, f"required in the first row of walk {row['walk']!r}")
     document = {
-        "name": name,
-        "controller": cells["controller"],
-        "design": _design(path, line, cells),
-        "scenarios": [
-            _scenario(path, line, entry) if entry.endswith(".json") else entry
-            for entry in cells["scenario"].split()
-        ],
+        "name": row["walk"],
+        "controller": row["controller"],
+        "design": _design(row["design"], row["controller"], folder),
+        "scenarios": [_scenario(entry, folder) for entry in row["scenario"].split()],
     }
-    columns = {"name": "walk", "scenarios": "scenario"}
-    return _checked(path, line, TargetWalk, document, columns).model_dump(mode="json")
+    return _checked(TargetWalk, document)
 
 
-def _scenario(path: Path, line: int, name: str) -> dict[str, Any]:
+def _scenario(entry: str, folder: Path) -> str | dict[str, Any]:
+    if not entry.endswith(".json"):
+        return entry
     try:
-        return read_json_object(path.parent / name, "scenario")
+        return read_json_object(folder / entry, "scenario")
     except InvalidRequest as error:
-        message = str(error).removeprefix("scenario: ")
-        raise _refusal(path, line, "scenario", message) from error
+        raise _CellError("scenario", str(error).removeprefix("scenario: ")) from error
 
 
-def _design(path: Path, line: int, cells: Mapping[str, str]) -> dict[str, Any]:
-    cell = cells["design"]
+def _design(cell: str, controller: str, folder: Path) -> dict[str, Any]:
     try:
         if cell.startswith("{"):
-            design = json.loads(cell)
-            return dict(design)
+            return dict(json.loads(cell))
         if not cell.startswith("published:"):
-            cell = str(path.parent / cell)
-        return read_design(cell, cells["controller"])
+            cell = str(folder / cell)
+        return read_design(cell, controller)
     except InvalidRequest as error:
         column = "controller" if error.field == "controller" else "design"
-        raise _refusal(path, line, column, str(error).removeprefix("design: ")) from error
+        raise _CellError(column, str(error).removeprefix("design: ")) from error
     except ValueError as error:
-        raise _refusal(path, line, "design", f"not JSON: {error}") from error
+        raise _CellError("design", f"not JSON: {error}") from error
 
 
-def _target(
-    path: Path, line: int, row: Mapping[str, str], walks: Mapping[str, dict[str, Any]]
-) -> dict[str, Any]:
+def _target(row: Mapping[str, str], scenarios: int) -> dict[str, Any]:
+    """Return the target of a row; scenarios: number of those of its walk."""
     from gaitswarm.sim.calibration import QUANTITIES, Target
 
     document: dict[str, Any] = {
@@ -151,30 +145,21 @@ def _target(
         try:
             document[column] = float(row[column])
         except ValueError as error:
-            raise _refusal(path, line, column, f"{row[column]!r} is not a number") from error
-    target = _checked(path, line, Target, document, {})
-    scenarios = len(walks[row["walk"]]["scenarios"])
+            raise _CellError(column, f"{row[column]!r} is not a number") from error
+    target = _checked(Target, document)
     if scenarios > 1 and not QUANTITIES[document["quantity"]].scenarios:
-        raise _refusal(
-            path, line, "quantity", f"applies to one scenario, but the walk has {scenarios}"
-        )
-    return target.model_dump(mode="json")
+        raise _CellError("quantity", f"applies to one scenario, but the walk has {scenarios}")
+    return target
 
 
-def _checked(
-    path: Path,
-    line: int,
-    model: type[BaseModel],
-    document: dict[str, Any],
-    columns: Mapping[str, str],
-) -> BaseModel:
-    """Validate a document; columns: those of fields with another name in the table."""
+def _checked(model: type[BaseModel], document: dict[str, Any]) -> dict[str, Any]:
+    """Return a validated document as JSON values."""
     from pydantic import ValidationError
 
     from gaitswarm.sim.input import message_of, without_tags
 
     try:
-        return model.model_validate(document)
+        return model.model_validate(document).model_dump(mode="json")
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         message = message_of(first)
@@ -186,8 +171,5 @@ def _checked(
         else:
             # Validators of the whole document put the field first.
             field, _, message = message.partition(": ")
-        raise _refusal(path, line, columns.get(field, field), message) from error
-
-
-def _refusal(path: Path, line: int, column: str, message: str) -> InvalidRequest:
-    return InvalidRequest(f"{path}, line {line}, column {column}: {message}", field="targets")
+        column = {"name": "walk", "scenarios": "scenario"}.get(field, field)
+        raise _CellError(column, message) from error

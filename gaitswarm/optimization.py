@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.errors import JobEnded
 from gaitswarm.jobs.database import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.iteration import SUMMARY
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
@@ -56,11 +56,16 @@ class OptimizationResult:
             best_so_far (fitness, minimized, NaN where every design failed), failed (designs) and
             evaluate_seconds [s].
         """
-        columns: dict[str, NDArray[Any]] = {
-            name: np.array([getattr(i, name) for i in self.iterations], dtype=kind)
-            for name, kind in _CONVERGENCE.items()
-        }
-        return Table(columns)
+        whole = ("index", "designs", "failed")
+        return Table(
+            {
+                name: np.array(
+                    [getattr(i, name) for i in self.iterations],
+                    dtype=np.int64 if name in whole else np.float64,
+                )
+                for name in _CONVERGENCE
+            }
+        )
 
     def evaluations(self) -> EvaluationTable:
         """All evaluations of the job, read from the database.
@@ -76,17 +81,7 @@ class OptimizationResult:
             return jobs.evaluations(self.job.id)
 
 
-_CONVERGENCE = {
-    "index": np.int64,
-    "designs": np.int64,
-    "best": np.float64,
-    "mean": np.float64,
-    "median": np.float64,
-    "worst": np.float64,
-    "best_so_far": np.float64,
-    "failed": np.int64,
-    "evaluate_seconds": np.float64,
-}
+_CONVERGENCE = ("index", "designs", *SUMMARY, "evaluate_seconds")
 
 
 def optimize(

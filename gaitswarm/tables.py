@@ -288,31 +288,18 @@ def _arrow(column: Column) -> pa.Array:
     return pa.array(column, mask=np.isnan(column) if column.dtype.kind == "f" else None)
 
 
-class _Sink(io.RawIOBase):
-    """A buffer that is read while it is written."""
+class _Sink(io.BytesIO):
+    """A buffer that is emptied while it is written; its position counts what was taken."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._parts: list[bytes] = []
-        self._length = 0
-
-    def writable(self) -> bool:
-        """Return True."""
-        return True
+    taken = 0
 
     def tell(self) -> int:
-        """Return the number of bytes written so far."""
-        return self._length
-
-    def write(self, data: Any, /) -> int:
-        """Append bytes."""
-        part = bytes(data)
-        self._parts.append(part)
-        self._length += len(part)
-        return len(part)
+        return self.taken + super().tell()
 
     def take(self) -> bytes:
         """Return and drop what was written since the last call."""
-        taken = b"".join(self._parts)
-        self._parts.clear()
-        return taken
+        content = self.getvalue()
+        self.seek(0)
+        self.truncate()
+        self.taken += len(content)
+        return content

@@ -174,22 +174,8 @@ class AsyncDatabaseJobs(AsyncJobs):
     ) -> JobView:
         """Run a job in a thread; where this is cancelled, the job is returned to the queue first.
 
-        Args:
-            job_id: Identifier of the job.
-            evaluator: As for `DatabaseJobs.run`.
-            cpus: Simulations to run at once on this machine; default all processors.
-            ray_address: A running Ray cluster, for all simulations.
-            accept_changes: Whether the job continues although its provenance (code, robot,
-                compiler) has changed; the change is recorded with it.
-            on_iteration: Called in the event loop after each iteration is committed.
-
-        Returns:
-            The job as it is then: ended or paused.
-
-        Raises:
-            Conflict: The job was cancelled.
-            ProvenanceChanged: The provenance has changed, which is not accepted.
-            EvaluatorUnavailable: The cluster cannot be reached.
+        Arguments, result and errors are those of `DatabaseJobs.run`; `on_iteration` is called in
+        the event loop.
         """
         jobs, stop = cast("DatabaseJobs", await self._jobs()), threading.Event()
 

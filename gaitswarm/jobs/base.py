@@ -1272,22 +1272,7 @@ class Jobs(ABC):
         world: Mapping[str, float] | None = None,
         log: bool = False,
     ) -> SimulationResult:
-        """Simulate one design where the jobs are; see `gaitswarm.simulate` for many.
-
-        Args:
-            design: Value of each of the controller's variables, and of any gait variable, in the
-                variables' units.
-            scenarios: One scenario or several: names or numbers of presets, or `Scenario`; default
-                all presets.
-            controller: Motor controller that drives the robot.
-            robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-            preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-                `Preference`.
-            precision: Of the physics' numbers: "double", or "single", which is about twice as fast
-                and needs a C compiler where it is simulated.
-            world: Perturbations of the model, as `values` of a certificate's worlds: numbers by
-                perturbation, nominal where there is none; None for the model itself.
-            log: Whether to record every simulation at 500 Hz.
+        """Simulate one design where the jobs are, with the arguments of `gaitswarm.simulate`.
 
         Returns:
             Arrays of one design.

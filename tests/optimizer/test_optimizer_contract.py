@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.services.optimizer.search.registry import METHODS
-from gaitswarm.testing.optimizers import (
+from gaitswarm.testing import (
     BUDGET,
     SearchContract,
     bits,

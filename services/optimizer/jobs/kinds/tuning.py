@@ -288,6 +288,12 @@ class JobSpec(WalksSpec):
         return (*CONTROLLERS.distribution(self.controller), *case)
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """Return fitness and utilities of n designs, over worlds where there are some.
+
+        Args:
+            objectives: (n, K, m) raw objectives.
+            failed: (n, K), true for a case without a result.
+        """
         judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
 

@@ -82,7 +82,11 @@ class TuningWorlds(BaseModel):
         return _drawn(self)
 
     def judged(self, log_utilities: Floats) -> Judgement:
-        """Judge designs by the geometric mean of `aggregated` (eq. 4.2)."""
+        """Judge designs by the geometric mean of `aggregated` (eq. 4.2).
+
+        Args:
+            log_utilities: As for `aggregated`.
+        """
         logarithms = self.aggregated(log_utilities)
         return Judgement(geometric_mean(logarithms), log_utilities)
 
@@ -90,7 +94,10 @@ class TuningWorlds(BaseModel):
         """Return (n, K) logarithms of utilities over worlds, by scenario.
 
         +inf for too many failures: more than 1 - `level` of the worlds for a quantile, any failure
-        for the others. log_utilities: (n, K W), worlds varying fastest, +inf after a failure.
+        for the others.
+
+        Args:
+            log_utilities: (n, K W), worlds varying fastest, +inf after a failure.
         """
         # Not -1: the number of scenarios cannot be inferred from an empty array.
         designs, walks = log_utilities.shape

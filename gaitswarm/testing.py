@@ -1,10 +1,15 @@
-"""Contract tests of search methods."""
+"""Contract suites that a plug-in's own tests subclass.
+
+They are plain classes of `test_` methods, for pytest or any compatible runner; no test runner is
+imported. The subject is looked up by name, so that its entry point is tested, too.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+import pickle
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -19,10 +24,239 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.sim.case import Case, LongCase, Walk, run_together
+from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
+from gaitswarm.sim.catalogue import check_design
+from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, Controller, LookupTable, names_of
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel.walk import check_gains
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
+from gaitswarm.sim.scenario import find_scenario
+from gaitswarm.sim.simulate import simulate
 
 Floats = NDArray[np.float64]
 
 refused = TestCase().assertRaisesRegex
+
+
+class CaseContract:
+    """Tests of a registered case. They evaluate two designs several times.
+
+    Attributes:
+        name: Of the case.
+        settings: Settings other than the defaults, fast ones.
+        scenario: The scenario, of which one cycle is simulated.
+        controller: Of the walk.
+        designs: Values of the controller's variables, by name, of designs that succeed.
+    """
+
+    name: str
+    settings: Mapping[str, Any] = MappingProxyType({})
+    scenario: str = "normal-fast"
+    controller: str = "p"
+    designs: tuple[Mapping[str, float], ...] = (
+        MappingProxyType({"P": 0.25}),
+        MappingProxyType({"P": 0.5}),
+    )
+    evaluated: ClassVar[Outcome]
+
+    @property
+    def read_settings(self) -> CaseSettings:
+        """Return the settings as in a job."""
+        return CASES[self.name].settings.model_validate({"name": self.name, **self.settings})
+
+    @property
+    def walk(self) -> Walk:
+        """The walk that the case replaces."""
+        names = tuple(variable.name for variable in CONTROLLERS[self.controller].variables)
+        scenario = find_scenario(self.scenario).model_copy(update={"cycles": 1.0})
+        return Walk(DEFAULT_ROBOT, self.controller, scenario, names)
+
+    @property
+    def case(self) -> Case:
+        """The case."""
+        return create_case(self.read_settings, self.walk)
+
+    @property
+    def rows(self) -> Floats:
+        """The designs as an array."""
+        return np.array([[design[n] for n in self.walk.variables] for design in self.designs])
+
+    def test_settings_come_back_from_their_document(self) -> None:
+        settings = self.read_settings
+        assert type(settings).model_validate(settings.model_dump(mode="json")) == settings
+        assert settings.name == self.name
+        document = {**settings.model_dump(), "no_such_setting": 1}
+        refused(ValueError, "no_such_setting", type(settings).model_validate, document)
+
+    def test_it_stands_for_the_walk(self) -> None:
+        case, walk = self.case, self.walk
+        assert isinstance(case, Case)
+        assert (case.name, case.robots, case.objectives) == (
+            walk.name,
+            walk.robots,
+            walk.objectives,
+        )
+        assert case.duration > 0.0 and math.isfinite(case.duration)
+
+    @property
+    def outcome(self) -> Outcome:
+        """Outcome of the designs, evaluated once for all tests."""
+        contract = type(self)
+        if "evaluated" not in vars(contract):
+            contract.evaluated = self.checked(self.case.run(self.rows), len(self.rows))
+        return contract.evaluated
+
+    def test_outcomes_are_in_the_order_of_designs_and_designs_do_not_meet(self) -> None:
+        case, rows, both = self.case, self.rows, self.outcome
+        last = self.checked(case.run(rows[-1:]), 1)
+        assert both.objectives[-1:].tobytes() == last.objectives.tobytes()
+        assert both.statuses[-1:].tobytes() == last.statuses.tobytes()
+        turned = self.checked(case.run(rows[::-1]), len(rows))
+        assert turned.objectives[::-1].tobytes() == both.objectives.tobytes()
+
+    def test_another_process_gets_the_same_case(self) -> None:
+        copy = pickle.loads(pickle.dumps(self.case))  # noqa: S301 - written by the line itself
+        assert copy.run(self.rows).objectives.tobytes() == self.outcome.objectives.tobytes()
+
+    def test_no_designs_are_no_outcomes(self) -> None:
+        self.checked(self.case.run(self.rows[:0]), 0)
+
+    def test_together_with_other_cases_it_has_the_same_bits(self) -> None:
+        case, rows = self.case, self.rows
+        together, _ = run_together([case, self.walk], [rows, rows])
+        assert together.objectives.tobytes() == self.outcome.objectives.tobytes()
+
+    def test_the_controller_is_what_drives_it(self) -> None:
+        objectives = self.outcome.objectives
+        assert objectives[0].tobytes() != objectives[-1].tobytes()
+
+    def test_a_design_that_cannot_be_simulated_is_refused(self) -> None:
+        wrong = self.rows.copy()
+        wrong[0, 0] = math.nan
+        refused(SimulationInputError, self.walk.variables[0], self.case.run, wrong)
+
+    def test_a_pose_out_of_reach_is_a_status(self) -> None:
+        walk = self.walk
+        far = Walk(
+            walk.robot, walk.controller, with_gait(walk.scenario, {"stride": 1.0}), walk.variables
+        )
+        outcome = create_case(self.read_settings, far).run(self.rows)
+        assert (outcome.statuses != Status.OK).all()
+
+    def test_a_long_case_can_be_broken_off(self) -> None:
+        case = self.case
+        if isinstance(case, LongCase):
+            try:
+                case.run_until(self.rows, lambda: True)
+            except Exception:  # noqa: BLE001 - of any kind, says the protocol
+                return
+            raise AssertionError("run_until ignored should_stop")
+
+    def checked(self, outcome: Outcome, count: int) -> Outcome:
+        """Check the shape, statuses and numbers of an outcome."""
+        assert outcome.objectives.shape == (count, len(self.case.objectives))
+        assert outcome.objectives.dtype == np.float64 and outcome.statuses.dtype == np.uint8
+        assert set(outcome.statuses.tolist()) <= set(Status)
+        assert np.isfinite(outcome.objectives[outcome.statuses == Status.OK]).all()
+        return outcome
+
+
+class ControllerContract:
+    """Tests of a registered controller.
+
+    Attributes:
+        name: Of the controller.
+        design: A design that succeeds; the middle of the bounds for missing variables.
+        scenario: The scenario.
+        robot: The robot.
+    """
+
+    name: str
+    design: Mapping[str, float] = MappingProxyType({})
+    scenario: str = "normal-fast"
+    robot: RobotSource = DEFAULT_ROBOT
+
+    @property
+    def controller(self) -> Controller:
+        """The registered controller."""
+        return CONTROLLERS[self.name]
+
+    @property
+    def walking_design(self) -> dict[str, float]:
+        """Value of every variable."""
+        middle = {
+            v.name: float(round((v.low + v.high) / 2))
+            if v.kind != "continuous"
+            else (v.low + v.high) / 2
+            for v in self.controller.variables
+        }
+        return middle | dict(self.design)
+
+    def test_names_are_its_own(self) -> None:
+        names = [v.name for v in (*self.controller.variables, *self.controller.conventions)]
+        assert len(names) == len(set(names))
+        assert not set(GAIT_CATALOGUE) & set(names)
+        assert self.controller.name == self.name and self.controller.description
+
+    def test_conventions_have_defaults(self) -> None:
+        assert all(v.default is not None for v in self.controller.conventions)
+
+    def test_every_corner_of_the_box_is_a_control_law(self) -> None:
+        variables = self.controller.variables
+        for side in ("low", "high"):
+            for one in variables:
+                design = {v.name: getattr(v, side) for v in variables}
+                other = one.high if side == "low" else one.low
+                self._check(self.controller.compile(design | {one.name: other}))
+
+    def test_the_same_design_is_the_same_law(self) -> None:
+        first, second = (self.controller.compile(self.walking_design) for _ in range(2))
+        assert _content(first) == _content(second)
+
+    def test_a_missing_variable_is_refused_by_name(self) -> None:
+        for variable in self.controller.variables:
+            design = {n: v for n, v in self.walking_design.items() if n != variable.name}
+            refused(SimulationInputError, variable.name, self.controller.compile, design)
+
+    def test_published_designs_are_complete(self) -> None:
+        known = names_of(self.controller) | set(GAIT_CATALOGUE)
+        for design in self.controller.published.values():
+            assert set(design) <= known
+            check_design(self.name, design)
+
+    def test_inferences_are_those_of_tables(self) -> None:
+        for inference in self.controller.inferences(self.walking_design):
+            assert isinstance(inference.table, LookupTable)
+            assert set(inference.axes) == set(inference.inputs)
+
+    def test_it_walks_to_the_same_bits_alone_and_in_company(self) -> None:
+        design = self.walking_design
+        designs = np.array([list(design.values())] * 2)
+        arguments = (find_scenario(self.scenario), self.name, tuple(design))
+        both = simulate(*arguments, designs, robot=self.robot).outcome
+        alone = simulate(*arguments, designs[:1], robot=self.robot).outcome
+        assert both.objectives[:1].tobytes() == alone.objectives.tobytes()
+        assert both.objectives[1:].tobytes() == alone.objectives.tobytes()
+
+    def _check(self, law: ControlLaw) -> None:
+        assert isinstance(law, ControlLaw)
+        gains = (law.proportional_gain, law.integral_gain, law.derivative_gain)
+        assert all(isinstance(gain, int) for gain in gains)
+        check_gains(law, torque=load_robot(self.robot).is_torque_controlled)
+
+
+def _content(law: ControlLaw) -> list[object]:
+    """The integers and tables of a control law."""
+    found: list[object] = [law.proportional_gain, law.integral_gain, law.derivative_gain]
+    for table in (law.direct, law.integrated):
+        if isinstance(table, LookupTable):
+            scales = (table.output_gain, table.error_gain, table.current_gain, table.velocity_gain)
+            found += [table.values.shape, table.values.tobytes(), scales]
+    return found
+
 
 SPACES: Final[Mapping[str, Space]] = MappingProxyType(
     {
@@ -121,7 +355,7 @@ def through_json(optimizer: Optimizer) -> dict[str, Any]:
 def paths_of_another_process(states: Mapping[str, Mapping[str, Any]]) -> dict[str, list[bytes]]:
     """Paths of a new process continued from states, by method."""
     done = subprocess.run(
-        [sys.executable, "-m", __name__],
+        [sys.executable, "-m", "gaitswarm.testing"],
         input=json.dumps(states),
         capture_output=True,
         text=True,
@@ -139,10 +373,6 @@ def _go_on() -> None:
         optimizer.load(state)
         found[name] = [row.hex() for row in bits(path(optimizer, name))]
     json.dump(found, sys.stdout)
-
-
-if __name__ == "__main__":
-    _go_on()
 
 
 class SearchContract:
@@ -311,3 +541,7 @@ class OptimizerContract(SearchContract):
         done = len(list(path(stopped, self.name, evaluations=BUDGET // 2)))
         found = paths_of_another_process({self.name: stopped.dump()})
         assert found[self.name] == bits(whole_path(self.name)[done:])
+
+
+if __name__ == "__main__":
+    _go_on()

@@ -153,6 +153,9 @@ def _verification(
         yield from (f"  {line}" for line in view.provenance)
     if view.replayed:
         yield f"sampled by seed {view.seed}"
+    unproved = getattr(view, "unproved", ())
+    if unproved:
+        yield f"not proved by the file: {', '.join(unproved)} of the job"
     result = "verified" if view.verified else "NOT verified"
     digest = getattr(view, "sha256", None)
     what = f"job {view.job}" if digest is None else f"SHA-256 {digest}"

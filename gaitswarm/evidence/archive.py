@@ -249,7 +249,10 @@ def check_robots(members: Mapping[str, bytes]) -> None:
 
 
 def _check_order(evidence: Evidence) -> None:
-    """Check that iterations are whole, in order, and as large as the asks."""
+    """Check that job and spec agree, and iterations are whole, in order, as large as the asks."""
+    job, spec = evidence.job, evidence.spec
+    if (job.name, job.kind) != (spec.name, spec.kind):
+        raise BadArchive(f"{JOB} is of a {job.kind} job {job.name!r}, {SPEC} of another")
     job, columns = evidence.job, evidence.columns
     sizes = [len(positions) for positions in evidence.asked]
     expected = np.repeat(np.arange(len(sizes)), sizes)
@@ -458,7 +461,7 @@ def _run(service: JobService, job: Job) -> _Run:
         parts = [reevaluated] if len(reevaluated) else []
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
     for number, robot in enumerate(spec.robot_sources):
-        files |= _robot(f"robots/{number}", robot)
+        files |= robot_members(f"robots/{number}", robot)
     return _Run(files, columns, iterations, provenance, view, summary)
 
 
@@ -562,7 +565,7 @@ def _asks(spec: AnySpec, links: Sequence[Link]) -> bytes:
     return sink.getvalue()
 
 
-def _robot(folder: str, source: RobotSource) -> dict[str, bytes]:
+def robot_members(folder: str, source: RobotSource) -> dict[str, bytes]:
     """The resolved robot and its source files."""
     robot = load_robot(source)
     files = {

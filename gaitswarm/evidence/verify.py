@@ -32,6 +32,7 @@ from gaitswarm.evidence.archive import (
     kernels_of,
     parsed_json,
     read_evidence,
+    robot_members,
     row_of,
 )
 from gaitswarm.services.optimizer.analysis.certificate import certificate as certificate_view
@@ -367,18 +368,25 @@ def _tried(check: Callable[[], Answer]) -> Answer:
 
 
 def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """Check the robots' files against the digests of the provenance."""
+    """Check the robots' files against the digests of the provenance, and against the spec."""
     content = b""
-    for number in range(len(evidence.spec.robot_sources)):
+    files: dict[str, bytes] = {}
+    for number, source in enumerate(evidence.spec.robot_sources):
         folder = f"robots/{number}"
         for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
             if name not in members:
                 return False, f"it has no {name}"
             content += members[name]
-    expected = evidence.provenance.records[-1].provenance.simulation.robot_digest
-    if hashlib.sha256(content).hexdigest()[:_DIGITS] != expected:
+        files |= robot_members(folder, source)
+    simulation = evidence.provenance.records[-1].provenance.simulation
+    if hashlib.sha256(content).hexdigest()[:_DIGITS] != simulation.robot_digest:
         return False, "the robot's files are not those that the provenance names"
-    return True, f"its files have the digest {expected} of the provenance"
+    if simulation.code_digest == job_provenance(evidence.spec).simulation.code_digest:
+        found = {name: member for name, member in members.items() if name.startswith("robots/")}
+        wrong = sorted(n for n in found | files if found.get(n) != files.get(n))
+        if wrong:
+            return False, f"{wrong[0]} is not of the robot in the spec"
+    return True, f"its files have the digest {simulation.robot_digest} of the provenance"
 
 
 def _fitness(evidence: Evidence) -> Answer:

@@ -77,5 +77,9 @@ class HistoryVerificationView(ReplayedView):
 class VerificationView(ReplayedView):
     """Results of checking evidence or a stored history."""
 
+    unproved: list[str] = Field(
+        default=["id", "state", "times"],
+        description="What the file says of the job without proof.",
+    )
     sha256: str = Field(description="Of the file.", examples=["9f86d081884c7d65..."])
     job: str | None = Field(description="Identifier of the job; null if it cannot be read.")

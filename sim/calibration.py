@@ -19,7 +19,7 @@ from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.kernel.walk import Precision, Walking, WalkRequest, WalkSetup, walk_together
-from gaitswarm.sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
+from gaitswarm.sim.outcome import N_OBJECTIVES, RESULTS, Objective, Outcome, Status
 from gaitswarm.sim.robot import Robot, RobotSource, load_robot
 from gaitswarm.sim.robot.identifiable import (
     CONVENTIONAL_VARIABLES,
@@ -229,9 +229,6 @@ def _planner(source: RobotSource, planned_soles: float | None) -> Robot:
 
 
 Floats = NDArray[np.float64]
-
-RESULTS: Final = (*OBJECTIVES, *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS))
-"""All results of a walk, f1 to f6 first."""
 
 
 @dataclass(frozen=True, slots=True)

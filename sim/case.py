@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.kernel.walk import Kernel, KernelTime, Precision, Walking, walk_together
-from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
+from gaitswarm.sim.outcome import OBJECTIVES, RESULTS, Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, simulating
@@ -107,8 +108,66 @@ def _run(case: Case, designs: NDArray[np.float64], should_stop: Callable[[], boo
     return case.run(designs)
 
 
+class SimulatedCase(ABC):
+    """Cases whose outcome is that of a simulation."""
+
+    __slots__ = ()
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        return OBJECTIVES
+
+    @abstractmethod
+    def _simulating(
+        self, designs: NDArray[np.float64], *, log: bool = False, kernel: Kernel | None = None
+    ) -> Walking[Simulation]:
+        """Prepare the simulation of all designs, by the robot's kernel or a given one."""
+
+    def simulate(
+        self, designs: NDArray[np.float64], *, log: bool = False, kernel: Kernel | None = None
+    ) -> Simulation:
+        """Simulate every design, with measurements and, if requested, logs.
+
+        Args:
+            designs: As for `run`.
+            log: Whether to record every simulation at 500 Hz.
+            kernel: Kernel of the robot, such as another engine's.
+        """
+        (simulation,) = walk_together([self._simulating(designs, log=log, kernel=kernel)])
+        return simulation
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        """Simulate every design."""
+        (outcome,) = walk_together([self.walking(designs)])
+        return outcome
+
+    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+        """Prepare the simulation of all designs together with other cases.
+
+        Args:
+            designs: As for `run`.
+        """
+        simulation = yield from self._simulating(designs)
+        return simulation.outcome
+
+
+class MeasuredCase(SimulatedCase):
+    """The same simulation with measurements as additional columns after the objectives."""
+
+    __slots__ = ()
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        return RESULTS
+
+    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+        simulation = yield from self._simulating(designs)
+        columns = [simulation.outcome.objectives, simulation.measurements.array()]
+        return Outcome(np.concatenate(columns, axis=1), simulation.outcome.statuses)
+
+
 @dataclass(frozen=True, slots=True)
-class Walk:
+class Walk(SimulatedCase):
     """Designs of a controller in a scenario; `variables` are the columns of the designs."""
 
     robot: RobotSource
@@ -129,15 +188,6 @@ class Walk:
     def duration(self) -> float:
         return self.scenario.duration
 
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        return OBJECTIVES
-
-    def run(self, designs: NDArray[np.float64]) -> Outcome:
-        """Simulate every design."""
-        (outcome,) = walk_together([self.walking(designs)])
-        return outcome
-
     def run_with(self, kernel: Kernel, designs: NDArray[np.float64]) -> Outcome:
         """Simulate every design with a given kernel.
 
@@ -145,20 +195,10 @@ class Walk:
             kernel: Kernel of the robot, such as another engine's.
             designs: As for `run`.
         """
-        (simulation,) = walk_together([self._simulating(designs, kernel)])
-        return simulation.outcome
-
-    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Prepare the simulation of all designs together with other cases.
-
-        Args:
-            designs: As for `run`.
-        """
-        walked = yield from self._simulating(designs)
-        return walked.outcome
+        return self.simulate(designs, kernel=kernel).outcome
 
     def _simulating(
-        self, designs: NDArray[np.float64], kernel: Kernel | None = None
+        self, designs: NDArray[np.float64], *, log: bool = False, kernel: Kernel | None = None
     ) -> Walking[Simulation]:
         return simulating(
             self.scenario,
@@ -166,21 +206,12 @@ class Walk:
             self.variables,
             designs,
             robot=self.robot,
+            log=log,
             precision=self.precision,
             kernel=kernel,
         )
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredWalk(Walk):
-    """The same simulation with measurements as additional columns after the objectives."""
-
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
-        return (*OBJECTIVES, *measured)
-
-    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        walked = yield from self._simulating(designs)
-        columns = [walked.outcome.objectives, walked.measurements.array()]
-        return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)
+class MeasuredWalk(MeasuredCase, Walk):
+    """A walk with its measurements."""

@@ -105,6 +105,9 @@ N_MEASUREMENTS: Final = len(MEASUREMENTS)
 OBJECTIVES_VERSION: Final = 2
 """Version of `OBJECTIVES` in provenances. In version 1, f6 was end height less start height."""
 
+RESULTS: Final = (*OBJECTIVES, *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS))
+"""All results of a walk, f1 to f6 first."""
+
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)
 N_OBJECTIVES: Final = len(OBJECTIVES)
 

@@ -97,7 +97,7 @@ def simulate(
     """
     (simulation,) = walk_together(
         [
-            _simulating(
+            simulating(
                 scenario,
                 controller,
                 variables,
@@ -117,30 +117,6 @@ def simulate(
 
 def simulating(
     scenario: Scenario,
-    controller: str,
-    variables: Sequence[str],
-    designs: NDArray[np.float64],
-    *,
-    robot: RobotChoice = DEFAULT_ROBOT,
-    backend: Backend = "auto",
-    precision: Precision = "double",
-    kernel: Kernel | None = None,
-) -> Walking[Simulation]:
-    """Prepare `simulate` for `walk_together`, with designs (n, len(variables))."""
-    return _simulating(
-        scenario,
-        controller,
-        variables,
-        designs,
-        robot=robot,
-        backend=backend,
-        precision=precision,
-        kernel=kernel,
-    )
-
-
-def _simulating(
-    scenario: Scenario,
     controller: str | ControlLaw,
     variables: Sequence[str],
     designs: NDArray[np.float64],
@@ -154,15 +130,13 @@ def _simulating(
     precision: Precision = "double",
     kernel: Kernel | None = None,
 ) -> Walking[Simulation]:
+    """Prepare `simulate` for `walk_together`, with a given kernel if there is one."""
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
     if noise is not None and noise.kind == "angle":
         machine = with_shafts(machine)
     kernel = kernel or kernel_of(machine, backend, precision=precision)
-    coding, timestep = control_steps(machine, physics_rate)
-    statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
-    objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
-    measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
+    _, timestep = control_steps(machine, physics_rate)
     setups: dict[int, WalkSetup] = {}
     plans: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
     for index, row in enumerate(designs.tolist()):
@@ -177,7 +151,7 @@ def _simulating(
         if key not in plans:
             walked = with_gait(scenario, gait)
             plans[key] = (
-                _plan_of_scenario(machine, walked, timestep)
+                plan_of_scenario(machine, walked, timestep)
                 if not gait and noise is None and planner is None
                 else plan_walk(
                     machine,
@@ -190,20 +164,41 @@ def _simulating(
         plan = plans[key]
         if plan is not None:
             setups[index] = plan(law)
+    return (
+        yield from walking(
+            machine, kernel, setups, len(designs), physics_rate=physics_rate, log=log
+        )
+    )
+
+
+def walking(
+    robot: Robot,
+    kernel: Kernel,
+    setups: Mapping[int, WalkSetup],
+    count: int,
+    *,
+    physics_rate: int = PHYSICS_RATE,
+    log: bool,
+) -> Walking[Simulation]:
+    """Simulate setups by index of the design; designs without one are unreachable."""
+    coding, timestep = control_steps(robot, physics_rate)
+    statuses = np.full(count, Status.UNREACHABLE, dtype=np.uint8)
+    objectives = np.full((count, N_OBJECTIVES), np.nan)
+    measured = np.full((count, N_MEASUREMENTS), np.nan)
+    logs: list[WalkLog | None] = [None] * count
     results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups.values()]
-    logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
         statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
         measured[index] = measure(setup, result, coding.substeps)
         if result.states is not None:
-            logs[index] = walk_log(machine, setup, result.states)
+            logs[index] = walk_log(robot, setup, result.states)
     return Simulation(
         Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
     )
 
 
 @lru_cache(maxsize=_PLANS_KEPT)
-def _plan_of_scenario(
+def plan_of_scenario(
     robot: Robot, scenario: Scenario, timestep: float
 ) -> Callable[[ControlLaw], WalkSetup] | None:
     """Walks in the scenario's own gait, which all tasks of a job begin with."""

@@ -5,42 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
+from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.case import MeasuredCase, SimulatedCase
 from gaitswarm.sim.controllers import ControlLaw, ControllerName, control_law
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.parameters import Layout, gravity_on
 from gaitswarm.sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
-from gaitswarm.sim.kernel.walk import (
-    Kernel,
-    Precision,
-    Walking,
-    WalkRequest,
-    WalkSetup,
-    walk_together,
-)
+from gaitswarm.sim.kernel.walk import Kernel, Precision, Walking, WalkSetup
 from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
 from gaitswarm.sim.mujoco.mjcf import Soles
-from gaitswarm.sim.outcome import (
-    MEASUREMENTS,
-    N_MEASUREMENTS,
-    N_OBJECTIVES,
-    OBJECTIVES,
-    Measurements,
-    Objective,
-    Outcome,
-    Status,
-)
+from gaitswarm.sim.outcome import N_OBJECTIVES, Objective, Outcome
 from gaitswarm.sim.robot import Robot, RobotSource, load_robot
 from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles
 from gaitswarm.sim.scenario import Scenario
-from gaitswarm.sim.simulate import Simulation
+from gaitswarm.sim.simulate import Simulation, plan_of_scenario, walking
 from gaitswarm.sim.worlds.perturbations import NOMINAL, check_worlds
 
 Floats = NDArray[np.float64]
@@ -205,12 +188,8 @@ def _sensor_errors(values: Mapping[str, Floats]) -> list[SensorErrors]:
     ]
 
 
-_PLANS_KEPT: Final = 16
-"""Number of scenarios whose plans for all worlds are cached."""
-
-
 @dataclass(frozen=True, slots=True)
-class PerturbedWalk:
+class PerturbedWalk(SimulatedCase):
     """Designs of a controller in a scenario of one world, unknown to the controller."""
 
     name: str  # unique in its job
@@ -230,42 +209,15 @@ class PerturbedWalk:
     def duration(self) -> float:
         return self.scenario.duration
 
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        return OBJECTIVES
-
-    def run(self, designs: Floats) -> Outcome:
-        (outcome,) = walk_together([self.walking(designs)])
-        return outcome
-
-    def walking(self, designs: Floats) -> Walking[Outcome]:
-        walked = yield from self._simulating(designs, log=False)
-        return walked.outcome
-
-    def simulate(self, designs: Floats, *, log: bool = False) -> Simulation:
-        (simulation,) = walk_together([self._simulating(designs, log=log)])
-        return simulation
-
-    def _simulating(self, designs: Floats, *, log: bool) -> Walking[Simulation]:
+    def _simulating(
+        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
+    ) -> Walking[Simulation]:
         robot = load_robot(self.robot)
-        kernel = kernel_of(robot, precision=self.precision)
-        coding, timestep = control_steps(robot)
-        statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
-        objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
-        measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
-        logs: list[WalkLog | None] = [None] * len(designs)
-        setups = self._setups(robot, designs, timestep)
-        results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups.values()]
-        for (index, setup), result in zip(setups.items(), results, strict=True):
-            statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
-            measured[index] = measure(setup, result, coding.substeps)
-            if result.states is not None:
-                logs[index] = walk_log(robot, setup, result.states)
-        return Simulation(
-            Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
-        )
+        kernel = kernel or kernel_of(robot, precision=self.precision)
+        setups = self._setups(robot, designs)
+        return (yield from walking(robot, kernel, setups, len(designs), log=log))
 
-    def _setups(self, robot: Robot, designs: Floats, timestep: float) -> dict[int, WalkSetup]:
+    def _setups(self, robot: Robot, designs: Floats) -> dict[int, WalkSetup]:
         """Setups by index of the design, without gaits out of the legs' reach."""
         of_gait: dict[tuple[float, ...], WalkSetup | None] = {}
         setups = {}
@@ -275,17 +227,16 @@ class PerturbedWalk:
             law = control_law(self.controller, tuple(design.items()))
             key = tuple(gait.values())
             if key not in of_gait:
-                of_gait[key] = self._in_world(robot, gait, law, timestep)
+                of_gait[key] = self._in_world(robot, gait, law)
             setup = of_gait[key]
             if setup is not None:
                 setups[index] = replace(setup, control_law=law)
         return setups
 
-    def _in_world(
-        self, robot: Robot, gait: dict[str, float], law: ControlLaw, timestep: float
-    ) -> WalkSetup | None:
+    def _in_world(self, robot: Robot, gait: dict[str, float], law: ControlLaw) -> WalkSetup | None:
         scenario = with_gait(self.scenario, gait)
-        plan = (plan_walk if gait else _plan_of_scenario)(robot, scenario, timestep)
+        _, timestep = control_steps(robot)
+        plan = (plan_walk if gait else plan_of_scenario)(robot, scenario, timestep)
         if plan is None:
             return None
         names, values = tuple(name for name, _ in self.world), [v for _, v in self.world]
@@ -296,29 +247,12 @@ class PerturbedWalk:
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredPerturbedWalk(PerturbedWalk):
-    """The same simulation with measurements as additional columns after the objectives."""
-
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
-        return (*OBJECTIVES, *measured)
-
-    def walking(self, designs: Floats) -> Walking[Outcome]:
-        walked = yield from self._simulating(designs, log=False)
-        columns = [walked.outcome.objectives, walked.measurements.array()]
-        return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)
-
-
-@lru_cache(maxsize=_PLANS_KEPT)
-def _plan_of_scenario(
-    robot: Robot, scenario: Scenario, timestep: float
-) -> Callable[[ControlLaw], WalkSetup] | None:
-    return plan_walk(robot, scenario, timestep)
+class MeasuredPerturbedWalk(MeasuredCase, PerturbedWalk):
+    """A perturbed walk with its measurements."""
 
 
 @dataclass(frozen=True, slots=True)
-class WorldWalk:
+class WorldWalk(SimulatedCase):
     """One design in one scenario; the world varies.
 
     Desired angles and control law are those of the robot as described: the controller does not know
@@ -347,55 +281,22 @@ class WorldWalk:
         cycle_time = dict(self.design).get("cycle_time", self.scenario.cycle_time)
         return self.scenario.cycles * cycle_time
 
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        return OBJECTIVES
-
-    def run(self, designs: Floats) -> Outcome:
-        (outcome,) = walk_together([self.walking(designs)])
-        return outcome
-
-    def run_with(self, kernel: Kernel | None, worlds: Floats) -> Outcome:
-        (simulation,) = walk_together([self._simulating(worlds, log=False, kernel=kernel)])
-        return simulation.outcome
-
-    def walking(self, designs: Floats) -> Walking[Outcome]:
-        walked = yield from self._simulating(designs, log=False)
-        return walked.outcome
-
-    def simulate(self, worlds: Floats, *, log: bool = False) -> Simulation:
-        (simulation,) = walk_together([self._simulating(worlds, log=log)])
-        return simulation
-
     def _simulating(
-        self, worlds: Floats, *, log: bool, kernel: Kernel | None = None
+        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
     ) -> Walking[Simulation]:
-        check_worlds(self.variables, worlds)
+        check_worlds(self.variables, designs)
         robot = load_robot(self.robot)
         kernel = kernel or kernel_of(robot, precision=self.precision)
-        coding, timestep = control_steps(robot)
-        statuses = np.full(len(worlds), Status.UNREACHABLE, dtype=np.uint8)
-        objectives = np.full((len(worlds), N_OBJECTIVES), np.nan)
-        measured = np.full((len(worlds), N_MEASUREMENTS), np.nan)
-        logs: list[WalkLog | None] = [None] * len(worlds)
-        setups = self._setups(worlds, timestep)
-        results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups]
-        for index, (setup, result) in enumerate(zip(setups, results, strict=True)):
-            statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
-            measured[index] = measure(setup, result, coding.substeps)
-            if result.states is not None:
-                logs[index] = walk_log(robot, setup, result.states)
-        return Simulation(
-            Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
-        )
+        setups = dict(enumerate(self._setups(robot, designs)))
+        return (yield from walking(robot, kernel, setups, len(designs), log=log))
 
-    def _setups(self, worlds: Floats, timestep: float) -> list[WalkSetup]:
+    def _setups(self, robot: Robot, worlds: Floats) -> list[WalkSetup]:
         """One setup per world; none for a gait out of the legs' reach."""
-        robot = load_robot(self.robot)
         gait = {name: value for name, value in self.design if name in GAIT_CATALOGUE}
         gains = tuple((n, value) for n, value in self.design if n not in GAIT_CATALOGUE)
         scenario = with_gait(self.scenario, gait)
         law = control_law(self.controller, gains)
+        _, timestep = control_steps(robot)
         plan = plan_walk(robot, scenario, timestep)
         if plan is None:
             return []
@@ -445,7 +346,7 @@ class EngineWalk:
         for engine in np.unique(engines).tolist():
             rows = np.flatnonzero(engines == engine)
             kernel = self._kernel(engine, should_stop) if engine else None
-            outcome = self.walk.run_with(kernel, worlds[rows])
+            outcome = self.walk.simulate(worlds[rows], kernel=kernel).outcome
             objectives[rows], statuses[rows] = outcome.objectives, outcome.statuses
         return Outcome(objectives, statuses)
 

@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
-from gaitswarm.sim.calibration import RESULTS
-from gaitswarm.sim.outcome import N_OBJECTIVES
+from gaitswarm.sim.outcome import N_OBJECTIVES, RESULTS
 from tests.calibration.conftest import PI, WALKS, spec
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 

@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Reevaluation
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.sim.calibration import RESULTS
+from gaitswarm.sim.outcome import RESULTS
 from gaitswarm.sim.variables import Variable
 from tests.calibration.conftest import spec
 from tests.optimizer.columns import columns_of

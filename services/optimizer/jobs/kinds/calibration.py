@@ -23,7 +23,6 @@ from gaitswarm.services.optimizer.jobs.preference import (
 from gaitswarm.services.optimizer.jobs.spec import Spec, requested
 from gaitswarm.sim.calibration import (
     QUANTITIES,
-    RESULTS,
     CalibrationWalk,
     Target,
     TargetWalk,
@@ -37,7 +36,7 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, orders_searched
 from gaitswarm.sim.identification import Recordings
-from gaitswarm.sim.outcome import Objective
+from gaitswarm.sim.outcome import RESULTS, Objective
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.robot.variant import RobotName
 from gaitswarm.sim.scenario import Scenario

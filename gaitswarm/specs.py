@@ -257,15 +257,10 @@ Design = dict[str, float | str]
 
 @dataclass(frozen=True, slots=True)
 class StartFile:
-    """Designs of a CSV file, in the order in which a search is to begin with them.
-
-    Attributes:
-        lines: Where each design ends in the file, from 1.
-        designs: The designs, as the `start` of a spec has them.
-    """
+    """Designs of a CSV file, in the order in which a search is to begin with them."""
 
     path: Path
-    lines: tuple[int, ...]
+    lines: tuple[int, ...]  # where each design ends in the file, from 1
     designs: tuple[Design, ...]
 
     def located(self, error: InvalidRequest) -> InvalidRequest:

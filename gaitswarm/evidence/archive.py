@@ -395,18 +395,14 @@ def evidence(service: JobService, job_id: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """The stored data of one job: its members without page and figures, and parts of them.
-
-    Attributes:
-        summary: Of a certificate with at least one drawn world.
-    """
+    """The stored data of one job: its members without page and figures, and parts of them."""
 
     files: Mapping[str, bytes]
     columns: EvaluationColumns
     iterations: Sequence[IterationView]
     provenance: ProvenanceDocument
     best: BestView | None
-    summary: CertificateView | None
+    summary: CertificateView | None  # of a certificate with at least one drawn world
 
 
 def _run(service: JobService, job: Job) -> _Run:

@@ -35,16 +35,10 @@ _WORST: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class CertificateOnPage:
-    """A certificate as the page shows it.
-
-    Attributes:
-        view: Its results.
-        place: Of the certified design in the job; None for the job's own page.
-        is_best: Whether the design is the job's best.
-    """
+    """A certificate as the page shows it."""
 
     view: CertificateView
-    place: tuple[int, int] | None = None
+    place: tuple[int, int] | None = None  # of the design in the job; None on the job's own page
     is_best: bool = False
 
     @property

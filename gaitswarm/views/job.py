@@ -115,15 +115,11 @@ class HistoryIterationView(IterationView):
 
 @dataclass(frozen=True, slots=True)
 class Spent:
-    """How much of a budget is spent. Its text is `12 of 25 iterations`.
-
-    Attributes:
-        unit: `designs` if there are iterations with fewer than they may have.
-    """
+    """How much of a budget is spent. Its text is `12 of 25 iterations`."""
 
     done: int
     planned: int
-    unit: Literal["iterations", "designs"]
+    unit: Literal["iterations", "designs"]  # designs if an iteration has fewer than it may have
 
     def __str__(self) -> str:
         return f"{self.done} of {self.planned} {self.unit}"

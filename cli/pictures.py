@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.sim.controllers.surface import Surface
     from gaitswarm.sim.drives import WalkFigures
-    from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
-    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised
     from gaitswarm.sim.validation import Comparison
 
 _STYLE: Final[dict[Any, Any]] = {

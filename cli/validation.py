@@ -15,7 +15,7 @@ from gaitswarm.sim.validation import Tolerance
 
 if TYPE_CHECKING:
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.measurement.measured_log import Synchronised
     from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison
 
 REPORT: Final = "report.md"

@@ -124,17 +124,11 @@ LARGEST_COPY: Final = 256 * 1024 * 1024
 
 @dataclass(frozen=True, slots=True)
 class MeshCopies:
-    """What became of the meshes that a URDF names.
+    """What became of the meshes that a URDF names."""
 
-    Attributes:
-        copied: names of those that were copied, as the URDF has them.
-        size: of their files together [B].
-        left_out: names of the others, each with the reason.
-    """
-
-    copied: tuple[str, ...] = ()
-    size: int = 0
-    left_out: tuple[tuple[str, str], ...] = ()
+    copied: tuple[str, ...] = ()  # their names, as the URDF has them
+    size: int = 0  # of their files together [B]
+    left_out: tuple[tuple[str, str], ...] = ()  # names of the others, each with the reason
 
 
 def copy_meshes(urdf: str, folder: Path, output: Path, packages: Sequence[Path] = ()) -> MeshCopies:

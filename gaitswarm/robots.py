@@ -30,8 +30,8 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_apart, walking_proposal
 from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.frame import Axis, Frame
-from gaitswarm.sim.proposal.gait import walk_of_robot
 from gaitswarm.sim.proposal.legs import reach_below
+from gaitswarm.sim.proposal.stance import walk_of_robot
 from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
 from gaitswarm.sim.robot.bounds import (
     LONGEST_NAME,
@@ -304,16 +304,10 @@ _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
 @dataclass(frozen=True, slots=True)
 class MadeRobot:
-    """A robot's folder that was written.
+    """A robot's folder that was written."""
 
-    Attributes:
-        name: of the robot.
-        guesses: what to look at, one sentence each.
-        meshes: what became of the meshes that the URDF names.
-    """
-
-    name: str
-    guesses: tuple[str, ...]
+    name: str  # of the robot
+    guesses: tuple[str, ...]  # what to check, one sentence each
     meshes: MeshCopies
 
 

@@ -30,7 +30,7 @@ from gaitswarm.sim.simulate import check_reach
 from gaitswarm.sim.variables import VariableName
 
 if TYPE_CHECKING:
-    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.measurement.measured_log import Synchronised
 
 _DECIMALS: Final = 5
 """Of a stored current [A]: far below the converter's resolution, and a third of the text."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
-from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised, synchronise
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 Floats = NDArray[np.float64]
@@ -131,19 +130,20 @@ def _samples(signal: Floats) -> Floats:
 class Tolerance(StrEnum):
     """Classes of RMAE by their colours in the thesis, from good to bad."""
 
-    GREEN = "green"
-    YELLOW = "yellow"
-    ORANGE = "orange"
-    RED = "red"
-    PURPLE = "purple"
+    limit: float  # largest relative mean absolute error of the class [1]
+    phrase: str
 
-    @property
-    def limit(self) -> float:
-        return _LIMITS[self]
+    GREEN = "green", 0.02, "as exact as a digital measurement"
+    YELLOW = "yellow", 0.10, "as exact as an analog measurement"
+    ORANGE = "orange", 0.30, "moderate, acceptable under conditions"
+    RED = "red", 0.50, "unacceptable"
+    PURPLE = "purple", math.inf, "a serious error"
 
-    @property
-    def phrase(self) -> str:
-        return _PHRASES[self]
+    def __new__(cls, colour: str, limit: float, phrase: str) -> Self:
+        tolerance = str.__new__(cls, colour)
+        tolerance._value_ = colour
+        tolerance.limit, tolerance.phrase = limit, phrase
+        return tolerance
 
     @classmethod
     def of(cls, rmae: float) -> Tolerance:
@@ -154,22 +154,6 @@ class Tolerance(StrEnum):
         """
         return next((known for known in cls if rmae <= known.limit), cls.PURPLE)
 
-
-_LIMITS: Final = {
-    Tolerance.GREEN: 0.02,
-    Tolerance.YELLOW: 0.10,
-    Tolerance.ORANGE: 0.30,
-    Tolerance.RED: 0.50,
-    Tolerance.PURPLE: math.inf,
-}
-
-_PHRASES: Final = {
-    Tolerance.GREEN: "as exact as a digital measurement",
-    Tolerance.YELLOW: "as exact as an analog measurement",
-    Tolerance.ORANGE: "moderate, acceptable under conditions",
-    Tolerance.RED: "unacceptable",
-    Tolerance.PURPLE: "a serious error",
-}
 
 SPECTRAL_QUANTITIES: Final = (Quantity.CURRENT,)
 """Quantities whose spectra are compared."""

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
         ParameterView,
     )
     from gaitswarm.services.optimizer.analysis.targets import ReachedView, TargetsView
-    from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
-    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk, Synchronised
     from gaitswarm.sim.robot import Robot
 
 LARGEST_FILE: Final = 1 << 28
@@ -94,7 +93,7 @@ def synchronised(
 ) -> Synchronised:
     """Align a log with the simulated walk; errors name the file."""
     from gaitswarm.sim.errors import MeasuredLogError
-    from gaitswarm.sim.measurement.synchronise import synchronise
+    from gaitswarm.sim.measurement.measured_log import synchronise
 
     try:
         return synchronise(log, simulated, walk.cycle_time)

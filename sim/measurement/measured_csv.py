@@ -58,24 +58,18 @@ def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
     _check_time(time, line_of)
     _check_currents(values, places, line_of)
 
-    def columns(quantity: Quantity) -> Floats:
-        return np.ascontiguousarray(values[:, list(places[quantity].values())])
-
+    columns = {
+        quantity.column: np.ascontiguousarray(values[:, list(of_channels.values())])
+        for quantity, of_channels in places.items()
+        if of_channels
+    }
     return MeasuredLog(
         joints=robot.joint_names,
         legs=tuple(leg.name for leg in robot.legs),
         time=time.copy(),
-        desired_angle=columns(Quantity.DESIRED_ANGLE),
-        control_voltage=columns(Quantity.CONTROL_VOLTAGE),
-        joint_angle=columns(Quantity.JOINT_ANGLE),
-        current=columns(Quantity.CURRENT),
-        supply=columns(Quantity.SUPPLY),
         potentiometer_joints=tuple(places[Quantity.POTENTIOMETER]),
-        potentiometer=columns(Quantity.POTENTIOMETER) if places[Quantity.POTENTIOMETER] else None,
-        body_acceleration=(
-            columns(Quantity.BODY_ACCELERATION) if places[Quantity.BODY_ACCELERATION] else None
-        ),
         metadata=metadata,
+        **columns,
     )
 
 

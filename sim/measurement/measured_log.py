@@ -1,19 +1,21 @@
-"""Quantities measured on a walking robot (thesis table 2.2), 500 rows per second, and the walk."""
+"""Quantities measured on a walking robot (thesis table 2.2), and synchronisation of its logs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.observation import WalkLog, sensed_currents
 from gaitswarm.sim.kernel.parameters import GRAVITY
+from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
@@ -33,58 +35,38 @@ SYNTHETIC: Final = "synthetic"
 class Quantity(StrEnum):
     """A row of table 2.2, by its symbol."""
 
-    DESIRED_ANGLE = "q_D"
-    CONTROL_VOLTAGE = "U_P"
-    JOINT_ANGLE = "q"
-    CURRENT = "I_M"
-    SUPPLY = "U_S"
-    POTENTIOMETER = "q_POT"
-    BODY_ACCELERATION = "a_BODY"
+    unit: str
+    per: Literal["joint", "leg", "axis"]  # each of which has one channel
+    column: str  # attribute of `MeasuredLog`
+    meaning: str  # for headings and documentation
 
-    @property
-    def unit(self) -> str:
-        return _FACTS[self].unit
+    DESIRED_ANGLE = "q_D", "rad", "joint", "desired_angle", "desired joint angle"
+    CONTROL_VOLTAGE = "U_P", "V", "joint", "control_voltage", "control signal of the PWM amplifier"
+    JOINT_ANGLE = "q", "rad", "joint", "joint_angle", "joint angle by the motor encoder"
+    CURRENT = "I_M", "A", "joint", "current", "absolute motor current"
+    SUPPLY = "U_S", "V", "leg", "supply", "supply voltage at the leg's board"
+    POTENTIOMETER = "q_POT", "rad", "joint", "potentiometer", "joint angle behind the backlash"
+    BODY_ACCELERATION = (
+        "a_BODY",
+        "g",
+        "axis",
+        "body_acceleration",
+        "acceleration of the body, without gravity",
+    )
 
-    @property
-    def per(self) -> Literal["joint", "leg", "axis"]:
-        """Each of these has one channel."""
-        return _FACTS[self].per
-
-    @property
-    def meaning(self) -> str:
-        """For headings and documentation."""
-        return _FACTS[self].meaning
+    def __new__(
+        cls, symbol: str, unit: str, per: Literal["joint", "leg", "axis"], column: str, meaning: str
+    ) -> Self:
+        quantity = str.__new__(cls, symbol)
+        quantity._value_ = symbol
+        quantity.unit, quantity.per = unit, per
+        quantity.column, quantity.meaning = column, meaning
+        return quantity
 
     @property
     def optional(self) -> bool:
         """Whether it is supplementary in table 2.2."""
         return self in (Quantity.POTENTIOMETER, Quantity.BODY_ACCELERATION)
-
-
-class _Facts(NamedTuple):
-    unit: str
-    per: Literal["joint", "leg", "axis"]
-    column: str
-    meaning: str
-
-
-_FACTS: Final = {
-    Quantity.DESIRED_ANGLE: _Facts("rad", "joint", "desired_angle", "desired joint angle"),
-    Quantity.CONTROL_VOLTAGE: _Facts(
-        "V", "joint", "control_voltage", "control signal of the PWM amplifier"
-    ),
-    Quantity.JOINT_ANGLE: _Facts("rad", "joint", "joint_angle", "joint angle by the motor encoder"),
-    Quantity.CURRENT: _Facts("A", "joint", "current", "absolute motor current"),
-    Quantity.SUPPLY: _Facts("V", "leg", "supply", "supply voltage at the leg's board"),
-    Quantity.POTENTIOMETER: _Facts(
-        "rad", "joint", "potentiometer", "joint angle behind the backlash"
-    ),
-    Quantity.BODY_ACCELERATION: _Facts(
-        "g", "axis", "body_acceleration", "acceleration of the body, without gravity"
-    ),
-}
-
-_COLUMNS: Final = tuple(facts.column for facts in _FACTS.values())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +133,7 @@ class MeasuredLog:
 
     def values(self, quantity: Quantity) -> Floats:
         """A quantity's columns (T, channels), in its unit."""
-        columns: Floats | None = getattr(self, _FACTS[quantity].column)
+        columns: Floats | None = getattr(self, quantity.column)
         return np.empty((len(self.time), 0)) if columns is None else columns
 
     def link_of(self, joint: str) -> int:
@@ -161,9 +143,9 @@ class MeasuredLog:
     def mapped(self, function: Callable[[Floats], Floats]) -> MeasuredLog:
         """Return the log with other columns."""
         columns: dict[str, Any] = {
-            name: function(column)
-            for name in _COLUMNS
-            if (column := getattr(self, name)) is not None
+            quantity.column: function(column)
+            for quantity in Quantity
+            if (column := getattr(self, quantity.column)) is not None
         }
         return replace(self, time=function(self.time), **columns)
 
@@ -226,3 +208,100 @@ class MeasuredWalk:
         if log is None or status not in (Status.OK, Status.STALLED):
             raise SimulationInputError(f"the simulated walk cannot be compared: {status.phrase}")
         return simulated_log(self.robot, log)
+
+
+_TIE: Final = 1e-6
+"""Relative difference of correlations up to which lags count as equally good."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Synchronised:
+    """The same whole cycles of a walk, measured and simulated, with the same rows."""
+
+    measured: MeasuredLog
+    simulated: MeasuredLog
+    lag: int  # rows by which the walk begins later in the measured log than in the simulated one
+    # number of whole walking cycles, the last of the common part, as a walk starts at rest
+    cycles: int
+    cycle_time: float  # [s]
+    correlation: float  # of the desired angles over the common part, 1 for equal gaits
+
+    @property
+    def lag_seconds(self) -> float:
+        """`lag` as time [s]."""
+        return self.lag * CONTROL_PERIOD
+
+
+def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float) -> Synchronised:
+    """Find the lag between two logs and trim both to their common whole cycles."""
+    if measured.joints != simulated.joints:
+        raise MeasuredLogError("the two logs have different joints")
+    cycle = round(cycle_time / CONTROL_PERIOD)
+    shortest = min(len(measured.time), len(simulated.time))
+    if shortest < cycle:
+        raise MeasuredLogError(
+            f"{shortest * CONTROL_PERIOD:g} s are shorter than a walking cycle of {cycle_time:g} s"
+        )
+    lag, correlation = find_lag(measured.desired_angle, simulated.desired_angle, cycle)
+    first, common = _common(lag, len(measured.time), len(simulated.time))
+    # A cycle need not be a whole number of rows.
+    cycles = int((common + 0.5) * CONTROL_PERIOD / cycle_time + 1e-9)
+    kept = min(common, round(cycles * cycle_time / CONTROL_PERIOD))
+    end = first + common
+    return Synchronised(
+        measured=measured.rows(end - kept, end),
+        simulated=simulated.rows(end - kept - lag, end - lag),
+        lag=lag,
+        cycles=cycles,
+        cycle_time=cycle_time,
+        correlation=correlation,
+    )
+
+
+def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, float]:
+    """Return the lag k [rows] with measured[t + k] = simulated[t], and the correlation there.
+
+    Desired angles are (T1, J) and (T2, J). The cross-correlation over the overlap identifies the
+    cycle, but it favours long overlaps and is off by some rows. Within a quarter of a cycle, the
+    mean square difference determines the exact row.
+    """
+    mean = simulated.mean(axis=0)
+    x, y = measured - mean, simulated - mean
+    if not (np.ptp(x, axis=0).any() and np.ptp(y, axis=0).any()):
+        raise MeasuredLogError("the desired angles are constant and cannot be aligned")
+    lags = np.arange(-(len(y) - 1), len(x))
+    # Rows of x in the overlap are [start, stop), those of y [start - k, stop - k).
+    start, stop = np.maximum(lags, 0), np.minimum(len(x), len(y) + lags)
+    long_enough = stop - start >= cycle
+    lags, start, stop = lags[long_enough], start[long_enough], stop[long_enough]
+    product = _cross_correlation(x, y)[lags + len(y) - 1]
+    energy_x, energy_y = _cumulated_energy(x), _cumulated_energy(y)
+    of_x = energy_x[stop] - energy_x[start]
+    of_y = energy_y[stop - lags] - energy_y[start - lags]
+    best = np.flatnonzero(product >= product.max() - _TIE * abs(product.max()))
+    coarse = lags[best[np.argmin(np.abs(lags[best]))]]
+    near = np.flatnonzero(np.abs(lags - coarse) <= cycle // 4)
+    difference = (of_x + of_y - 2.0 * product)[near] / (stop - start)[near]
+    chosen = near[np.argmin(difference)]
+    scale = float(np.sqrt(of_x[chosen] * of_y[chosen]))
+    return int(lags[chosen]), float(product[chosen]) / scale if scale > 0.0 else 0.0
+
+
+def _cross_correlation(x: Floats, y: Floats) -> Floats:
+    """sum over rows and columns of x[t + k] y[t], for k from -(len(y) - 1) to len(x) - 1."""
+    # Slow to import, and not needed to show recordings.
+    require_room_for_scipy()
+    from scipy.signal import fftconvolve  # noqa: PLC0415
+
+    product: Floats = fftconvolve(x, y[::-1], axes=0).sum(axis=1)
+    return product
+
+
+def _cumulated_energy(x: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))])
+
+
+def _common(lag: int, measured: int, simulated: int) -> tuple[int, int]:
+    """First row of the overlap in the measured log, and its length."""
+    first = max(lag, 0)
+    return first, min(measured, simulated + lag) - first

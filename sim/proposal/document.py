@@ -34,7 +34,6 @@ from gaitswarm.sim.proposal.frame import (
     turned,
     with_elements,
 )
-from gaitswarm.sim.proposal.gait import alternating_phases, propose_scenarios, walk_within_reach
 from gaitswarm.sim.proposal.legs import (
     FoundLeg,
     FoundLegs,
@@ -43,7 +42,13 @@ from gaitswarm.sim.proposal.legs import (
     find_legs,
     no_meshes,
 )
-from gaitswarm.sim.proposal.stance import Stance, choose_stance
+from gaitswarm.sim.proposal.stance import (
+    Stance,
+    alternating_phases,
+    choose_stance,
+    propose_scenarios,
+    walk_within_reach,
+)
 from gaitswarm.sim.robot.bounds import check_urdf
 from gaitswarm.sim.robot.elements import by_line
 from gaitswarm.sim.robot.robot import parse_robot

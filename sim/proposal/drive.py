@@ -14,7 +14,7 @@ import numpy as np
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
 from gaitswarm.sim.robot.actuators import ActuatorKind
-from gaitswarm.sim.robot.joints import Joint
+from gaitswarm.sim.robot.elements import Joint
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.urdf import Urdf
 

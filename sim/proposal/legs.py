@@ -15,7 +15,7 @@ from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.frame import check_upright, fixed_joint
 from gaitswarm.sim.robot.chain import Chain, chain_of
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG, Leg
-from gaitswarm.sim.robot.joints import TURNS, Joint
+from gaitswarm.sim.robot.elements import TURNS, Joint
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import visual_meshes

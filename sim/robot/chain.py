@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.near_names import nearest
 from gaitswarm.sim.robot.description import Leg
-from gaitswarm.sim.robot.elements import MOST_TURNED
+from gaitswarm.sim.robot.elements import MOST_TURNED, Joint
 from gaitswarm.sim.robot.inertia import BodyInertia, product
-from gaitswarm.sim.robot.joints import Joint
 from gaitswarm.sim.robot.urdf import Place, Urdf
 
 Floats = NDArray[np.float64]

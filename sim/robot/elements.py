@@ -1,10 +1,10 @@
-"""Numbers and frames of URDF elements, and errors that name their line."""
+"""Numbers, frames and joints of a URDF, and errors that name their line."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -140,3 +140,176 @@ def numbers_of(
             f" {'three numbers' if count == 3 else 'a number'} of {LARGEST:g} at most"
         )
     return values
+
+
+_KINDS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+
+
+TURNS: Final = frozenset({"revolute", "continuous"})
+"""Types of revolute joints."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A joint of any type."""
+
+    name: str  # as in the file
+    kind: str  # its type: revolute, fixed, ...
+    parent: str  # link that carries it
+    child: str  # link that it carries
+    origin: Origin  # of the child's frame in the parent's, at angle 0
+    axis: Floats  # of rotation in the child's frame, of unit length, (3,)
+    limits: tuple[float, float]  # least and largest position [rad]; infinite where there are none
+    effort: float  # largest torque [N m]; 0 where the file gives none
+    velocity: float  # largest rate [rad/s]; 0 where the file gives none
+    follows: str | None = None  # joint that it mimics
+
+    @property
+    def fixed(self) -> bool:
+        return self.kind == "fixed"
+
+
+def joint_of(element: ET.Element) -> Joint:
+    name = element.get("name", "")
+    parent, child = (_linked(element, end) for end in ("parent", "child"))
+    whose = f"joint {name!r}"
+    direction = element.find("axis")
+    axis = np.array([1.0, 0.0, 0.0]) if direction is None else numbers_of(direction, "xyz", whose)
+    length = math.hypot(*axis.tolist())
+    kind = element.get("type", "")
+    if length == 0.0 and kind != "fixed":
+        raise RobotFileError(
+            f"robot.urdf: {whose}: its axis must not be zero; use 0 1 0, for example"
+        )
+    if kind and kind not in _KINDS:
+        raise RobotFileError(
+            f"robot.urdf: {whose}: type={shortened(kind)!r} of <joint> must be one of"
+            f" {', '.join(_KINDS)}"
+        )
+    origin = origin_of(element, whose)
+    limit, mimic = element.find("limit"), element.find("mimic")
+    effort, velocity = (
+        0.0 if limit is None else float(numbers_of(limit, attribute, whose, "0", math.inf)[0])
+        for attribute in ("effort", "velocity")
+    )
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=parent,
+        child=child,
+        origin=origin,
+        axis=axis / (length or 1.0),
+        limits=_limits(limit, kind, whose),
+        effort=effort,
+        velocity=velocity,
+        follows=None if mimic is None else mimic.get("joint", ""),
+    )
+
+
+def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
+    """Fix held joints, at angles by name [rad], and a free base; make continuous joints revolute.
+
+    A robot's body moves freely anyway: a floating joint from a massless first link such as `world`
+    adds nothing.
+    """
+    changed = _free_base(root)
+    missing = set(held)
+    for element in root.findall("joint"):
+        name, kind = element.get("name", ""), element.get("type", "")
+        if name in held:
+            missing.discard(name)
+            _hold(element, kind, held[name])
+        elif kind == "continuous":
+            # Pinocchio has two coordinates for a continuous joint.
+            element.set("type", "revolute")
+            for limit in element.findall("limit"):
+                element.remove(limit)
+            ends = {"lower": f"{-LARGEST:g}", "upper": f"{LARGEST:g}"}
+            ET.SubElement(element, "limit", ends | {"effort": "0", "velocity": "0"})
+        else:
+            if kind in ("revolute", "prismatic"):
+                _check_limit(element.find("limit"), name)
+            continue
+        changed = True
+    if missing:
+        raise RobotFileError(
+            f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}; remove it"
+        )
+    return changed
+
+
+def _free_base(root: ET.Element) -> bool:
+    """Fix the floating joint of the body, if there is one; return whether there was."""
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    joints = [(_linked(e, "parent"), _linked(e, "child"), e) for e in root.findall("joint")]
+    children = {child for _, child, _ in joints}
+    link = next((name for name in links if name not in children), None)
+    while link in links and links[link].find("inertial") is None:
+        after = [(child, joint) for parent, child, joint in joints if parent == link]
+        if len(after) != 1 or (kind := after[0][1].get("type")) not in ("floating", "fixed"):
+            return False
+        link, joint = after[0]
+        if kind == "floating":
+            joint.set("type", "fixed")
+            # Its position is only a simulator's initial position.
+            for origin in joint.findall("origin"):
+                origin.set("xyz", "0 0 0")
+            return True
+        joints = [entry for entry in joints if entry[2] is not joint]
+    return False
+
+
+def _linked(joint: ET.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
+
+
+def _hold(element: ET.Element, kind: str, angle: float) -> None:
+    """Make a joint a fixed one, its frame rotated by the angle."""
+    joint = joint_of(element)
+    if kind not in (*TURNS, "fixed") and angle:
+        raise RobotFileError(
+            f"robot.toml: held_joints: joint {joint.name!r} is {kind} and does not turn; hold it"
+            " at 0"
+        )
+    if angle and kind != "fixed":
+        require_room_for_scipy()
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+        turned = Rotation.from_matrix(joint.origin.matrix())
+        turned = turned * Rotation.from_rotvec(angle * joint.axis)
+        xyz, rpy = joint.origin.xyz.tolist(), turned.as_euler("xyz").tolist()
+        for origin in element.findall("origin"):
+            element.remove(origin)
+        numbers = {"xyz": xyz, "rpy": rpy}
+        ET.SubElement(element, "origin", {k: " ".join(map(repr, v)) for k, v in numbers.items()})
+    element.set("type", "fixed")
+    for part in ("axis", "limit", "mimic", "dynamics"):
+        for child in element.findall(part):
+            element.remove(child)
+
+
+def _check_limit(limit: ET.Element | None, joint: str) -> None:
+    """Check the limits that Pinocchio requires; its own error does not name the joint."""
+    given = {} if limit is None else limit.attrib
+    missing = [name for name in ("effort", "velocity") if name not in given]
+    if missing:
+        raise RobotFileError(
+            f"robot.urdf: joint {joint!r} has no <limit> with {' and '.join(missing)}, which URDF"
+            ' requires: <limit lower="-1" upper="1" effort="10" velocity="10"/> [rad, N m, rad/s];'
+            ' a joint without limits has type="continuous"'
+        )
+
+
+def _limits(limit: ET.Element | None, kind: str, whose: str) -> tuple[float, float]:
+    if kind == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
+        return -math.inf, math.inf
+    lower, upper = (
+        float(numbers_of(limit, end, whose, "0", math.inf)[0]) for end in ("lower", "upper")
+    )
+    if lower > upper:
+        raise RobotFileError(
+            f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g};"
+            " swap them"
+        )
+    return lower, upper

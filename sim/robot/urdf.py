@@ -14,9 +14,17 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.robot.bounds import check_urdf, shortened
-from gaitswarm.sim.robot.elements import Origin, by_line, numbers_of, origin_of, with_line
+from gaitswarm.sim.robot.elements import (
+    Joint,
+    Origin,
+    by_line,
+    joint_of,
+    numbers_of,
+    origin_of,
+    standardise,
+    with_line,
+)
 from gaitswarm.sim.robot.inertia import NO_INERTIA, BodyInertia, product
-from gaitswarm.sim.robot.joints import Joint, joint_of, standardise
 
 Floats = NDArray[np.float64]
 

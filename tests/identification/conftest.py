@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from gaitswarm.sim.identification import RecordedWalk, record
-from gaitswarm.sim.measurement.measured_log import simulated_log
-from gaitswarm.sim.measurement.synchronise import synchronise
+from gaitswarm.sim.measurement.measured_log import simulated_log, synchronise
 from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
 from gaitswarm.sim.robot import Robot, load_robot
 from tests.examples.walks import PUBLISHED_A, logged_walk, short_walk

@@ -15,8 +15,7 @@ import gaitswarm
 from gaitswarm import JobView
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.sim.identification import record
-from gaitswarm.sim.measurement.measured_log import simulated_log
-from gaitswarm.sim.measurement.synchronise import synchronise
+from gaitswarm.sim.measurement.measured_log import simulated_log, synchronise
 from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
 from gaitswarm.sim.robot import load_robot
 from tests.calibration.conftest import WALKS

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gaitswarm.sim.errors import MeasuredLogError
-from gaitswarm.sim.measurement.synchronise import find_lag, synchronise
+from gaitswarm.sim.measurement.measured_log import find_lag, synchronise
 from tests.validation.walks import CYCLE, CYCLE_TIME, renamed_robot, szabadka, walking_log
 
 

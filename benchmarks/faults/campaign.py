@@ -59,6 +59,7 @@ class Clients:
 
     url: str
     documents: list[dict[str, Any]]
+    notify_url: str
     lost: int = 0
     ended: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     spec_of: dict[str, int] = field(default_factory=dict)
@@ -104,7 +105,7 @@ class Clients:
     def _submit(self, client: httpx2.Client, number: int) -> None:
         index = number % len(self.documents)
         # The same key until it is answered: a request whose answer was lost makes no second job.
-        key = {"Idempotency-Key": f"campaign-{number}"}
+        key = {"Idempotency-Key": f"campaign-{number}", "Notify-URL": self.notify_url}
         while not self._enough.is_set():
             with suppress(httpx2.HTTPError, ValueError, KeyError):
                 answer = client.post("/v1/jobs", json=self.documents[index], headers=key)
@@ -185,7 +186,8 @@ def run(
     """
     result, begun = Result(), time.monotonic()
     chosen = specs(iterations)
-    clients = Clients(deployment.api_url, [spec.model_dump(mode="json") for spec in chosen])
+    documents = [spec.model_dump(mode="json") for spec in chosen]
+    clients = Clients(deployment.api_url, documents, f"http://{deployment.receiver.host}/")
     clients.start()
     if not _commits(clients, 0, patience):
         result.manual.append("the deployment did not begin to work")
@@ -201,6 +203,9 @@ def run(
         say(f"{number + 1:4d} {kind:16} {lasted:5.1f} s, next commit after {recovery:5.1f} s")
     open_jobs = clients.finish(patience)
     result.manual += [f"job {job} stands still" for job in open_jobs]
+    result.manual += [
+        f"no notification of job {job} arrived" for job in _unnotified(deployment, clients)
+    ]
     result.seconds = time.monotonic() - begun
     result.restarts = {service.name: service.restarts for service in deployment.services}
     _judge(deployment, clients, chosen, result)
@@ -231,6 +236,14 @@ def _commits(clients: Clients, before: int, patience: float) -> bool:
             return False
         time.sleep(0.05)
     return True
+
+
+def _unnotified(deployment: Deployment, clients: Clients) -> set[str]:
+    """Jobs that have ended, of which the receiver took no notification in two minutes."""
+    ends = time.monotonic() + 120.0
+    while (missing := clients.ended.keys() - deployment.receiver.jobs) and time.monotonic() < ends:
+        time.sleep(_GLANCE)
+    return missing
 
 
 def _judge(deployment: Deployment, clients: Clients, chosen: list[JobSpec], result: Result) -> None:

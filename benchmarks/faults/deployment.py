@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal, Self
 
-from benchmarks.faults.machine import Clock, Disk, Network, can, process_group
+from benchmarks.faults.machine import Calls, Disk, Network, Receiver, can, process_group
 from benchmarks.faults.supervisor import Service
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.store import Store, open_store
@@ -36,7 +36,7 @@ class Deployment:
     Attributes:
         database: Kind of the database.
         with_ray: Whether walks run on a Ray cluster; else in the runners.
-        with_clock: Whether its processes, but for Ray's own, have a clock that can be stepped.
+        with_clock: Whether its processes, but for Ray's own, have calls that can be changed.
         lease_seconds: Of the runners [s].
         folder: Of everything that it writes.
         url: Of the database as the campaign itself reaches it.
@@ -47,7 +47,8 @@ class Deployment:
         server: The PostgreSQL server.
         disk: That of the database; None where none can be had.
         network: Between PostgreSQL and the others; None where none can be had.
-        clock: Theirs; None without one.
+        calls: Theirs; None where they cannot be changed.
+        receiver: Of the notifications about its jobs.
     """
 
     database: DatabaseKind = "sqlite"
@@ -63,7 +64,8 @@ class Deployment:
     server: Service | None = field(init=False, default=None)
     disk: Disk | None = field(init=False, default=None)
     network: Network | None = field(init=False, default=None)
-    clock: Clock | None = field(init=False, default=None)
+    calls: Calls | None = field(init=False, default=None)
+    receiver: Receiver = field(init=False, default_factory=Receiver)
     _ray_token: str = field(init=False, default_factory=lambda: secrets.token_hex(32))
     _stack: ExitStack = field(init=False, default_factory=ExitStack)
 
@@ -104,7 +106,8 @@ class Deployment:
             self.disk = Disk(data, _MEBIBYTES[self.database])
             self._stack.callback(self.disk.close)
         if self.with_clock and possible["clock"]:
-            self.clock = Clock(self.folder)
+            self.calls = Calls(self.folder, data)
+        self._stack.enter_context(self.receiver)
         urls = self._open_database(data, possible["network"])
         self.url = urls[-1]
         self.store().close()
@@ -191,6 +194,7 @@ class Deployment:
             "CPUS": "1",
             "CONCURRENT_JOBS": "2",
             "LOG_FORMAT": "json",
+            "WEBHOOK_HOSTS": self.receiver.host,
             **settings,
         }
         outside = {k: v for k, v in os.environ.items() if not k.startswith(("GAITSWARM_", "RAY_"))}
@@ -198,8 +202,8 @@ class Deployment:
         environment["PYTHONPATH"] = str(ROOT)
         if self.with_ray:
             environment |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": self._ray_token}
-        if self.clock is not None and with_clock:
-            environment |= self.clock.variables
+        if self.calls is not None and with_clock:
+            environment |= self.calls.variables
         limits = None
         if group and can()["processes"]:
             limits = process_group(name)

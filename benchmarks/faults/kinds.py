@@ -9,6 +9,7 @@ import sqlite3
 import time
 from abc import ABC, abstractmethod
 from contextlib import suppress
+from pathlib import Path
 from typing import ClassVar, Final
 
 from sqlalchemy import Connection, Engine, NullPool, create_engine, text
@@ -229,15 +230,93 @@ class ClockStep(Fault):
 
     @staticmethod
     def possible(deployment: Deployment) -> bool:
-        return deployment.clock is not None
+        return deployment.calls is not None
 
     def inject(self) -> None:
-        assert self.deployment.clock is not None
-        self.deployment.clock.step_to(3600 if self.draw < 0.5 else -3600)
+        assert self.deployment.calls is not None
+        self.deployment.calls.step_to(3600 if self.draw < 0.5 else -3600)
 
     def heal(self) -> None:
-        assert self.deployment.clock is not None
-        self.deployment.clock.step_to(0)
+        assert self.deployment.calls is not None
+        self.deployment.calls.step_to(0)
+
+
+class ClockStepAndKill(ClockStep):
+    """A runner is killed whose clock is a day ahead, with all leases that it wrote."""
+
+    name = "clock-step-kill"
+    shortest, longest = 3.0, 6.0
+
+    def inject(self) -> None:
+        assert self.deployment.calls is not None
+        self.deployment.calls.step_to(86_400)
+        time.sleep(self.deployment.lease_seconds / 2)
+        self.runner.send(signal.SIGKILL)
+
+
+class DiskError(Fault):
+    """Every write to the database's disk is an input/output error."""
+
+    name = "disk-error"
+    shortest, longest = 0.5, 4.0
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        # PostgreSQL ends itself, and recovers, as when it is killed.
+        return deployment.calls is not None and deployment.server is None
+
+    def inject(self) -> None:
+        assert self.deployment.calls is not None
+        self.deployment.calls.fail_writes(True)
+
+    def heal(self) -> None:
+        assert self.deployment.calls is not None
+        self.deployment.calls.fail_writes(False)
+
+
+class FileReplaced(Fault):
+    """The SQLite file is moved away, half of the time with another in its place, and put back."""
+
+    name = "file-replaced"
+    shortest, longest = 1.0, 4.0
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return deployment.server is None
+
+    def inject(self) -> None:
+        for file in self._files():
+            with suppress(FileNotFoundError):
+                file.rename(self._away(file))
+        if self.draw < 0.5:
+            self._files()[0].touch()
+
+    def heal(self) -> None:
+        for file in self._files():
+            file.unlink(missing_ok=True)
+        for file in self._files():
+            with suppress(FileNotFoundError):
+                self._away(file).rename(file)
+
+    def _files(self) -> list[Path]:
+        return [Path(self.deployment.url + end) for end in ("", "-wal", "-shm")]
+
+    @staticmethod
+    def _away(file: Path) -> Path:
+        return file.with_name(f"away-{file.name}")
+
+
+class SlowReceiver(Fault):
+    """The receiver of notifications answers, but never to the end."""
+
+    name = "slow-receiver"
+    shortest, longest = 2.0, 15.0
+
+    def inject(self) -> None:
+        self.deployment.receiver.slow = True
+
+    def heal(self) -> None:
+        self.deployment.receiver.slow = False
 
 
 class ForkRefused(Fault):
@@ -317,7 +396,7 @@ KINDS: Final[dict[str, type[Fault]]] = {
     for kind in (
         *(KillApi, KillRunner, KillPostgres, KillWorker, KillRaylet, KillGcs, KillAgent),
         *(StopRunner, DatabaseLocked, DiskFull, ClockStep, ForkRefused, OutOfMemory),
-        *(Partition, ClusterAway),
+        *(Partition, ClusterAway, ClockStepAndKill, DiskError, FileReplaced, SlowReceiver),
     )
 }
 """Every kind by its name."""

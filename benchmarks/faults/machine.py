@@ -1,41 +1,75 @@
-"""Faults of a machine in a campaign: disk, network and clock, all simulated."""
+"""What fails in a campaign, all simulated: disk, network, system calls, and a receiver."""
 
 from __future__ import annotations
 
+import json
 import mmap
 import os
 import shutil
 import struct
 import subprocess
+import threading
+import time
 from contextlib import suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
-_CLOCK: Final = r"""
+_PRELOADED: Final = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/time.h>
 #include <time.h>
+#include <unistd.h>
 
-static volatile long *step(void) {
+/* The step of the clock [s], and whether the disk fails. */
+static volatile long *state(void) {
     static volatile long *mapped;
-    static long none;
+    static long none[2];
     if (!mapped) {
-        const char *path = getenv("CLOCK_STEP_FILE");
+        const char *path = getenv("FAULTS_STATE");
         int file = path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
-        void *found = file < 0 ? MAP_FAILED : mmap(0, 8, PROT_READ, MAP_SHARED, file, 0);
-        mapped = found == MAP_FAILED ? &none : found;
+        void *found = file < 0 ? MAP_FAILED : mmap(0, 16, PROT_READ, MAP_SHARED, file, 0);
+        mapped = found == MAP_FAILED ? none : found;
     }
     return mapped;
 }
 
+/* Whether a file is on the disk that fails. */
+static int fails(int file) {
+    char link[64], path[4096];
+    const char *folder = getenv("FAULTS_DISK");
+    if (!folder || !state()[1]) return 0;
+    snprintf(link, sizeof link, "/proc/self/fd/%d", file);
+    ssize_t length = readlink(link, path, sizeof path);
+    if (length < (ssize_t)strlen(folder) || strncmp(path, folder, strlen(folder))) return 0;
+    errno = EIO;
+    return 1;
+}
+
+#define REAL(name, ...) \
+    static __typeof__(name) *real; \
+    if (!real) real = (__typeof__(name) *)dlsym(RTLD_NEXT, #name); \
+    return fails(file) ? -1 : real(__VA_ARGS__);
+
+ssize_t pwrite(int file, const void *from, size_t size, off_t at) {
+    REAL(pwrite, file, from, size, at)
+}
+ssize_t pwrite64(int file, const void *from, size_t size, off64_t at) {
+    REAL(pwrite64, file, from, size, at)
+}
+int fsync(int file) { REAL(fsync, file) }
+int fdatasync(int file) { REAL(fdatasync, file) }
+
 /* A wait until a time of day is the real kernel's, which knows of no step: who waits sees none. */
 static long step_for(const void *caller) {
-    long seconds = *step();
+    long seconds = state()[0];
     Dl_info found;
     if (seconds && dladdr(caller, &found) && found.dli_fname)
         if (strstr(found.dli_fname, "_raylet") || strstr(found.dli_fname, "libstdc++")) return 0;
@@ -71,31 +105,40 @@ time_t time(time_t *where) {
 """
 
 
-class Clock:
-    """The time of day of all processes that have its variables; it can be stepped as they run.
+class Calls:
+    """System calls of all processes that have its variables: time of day, and writes to a disk.
 
-    Ray's library in them keeps the real one: it waits until times of day, in the kernel, and would
-    wait an hour longer.
+    Both can be changed as they run. Ray's library in them keeps the real time: it waits until times
+    of day, in the kernel, and would wait an hour longer.
 
     Args:
-        folder: Of the library that reads it.
+        folder: Of the library that stands before the C library.
+        disk: Folder whose files can fail.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, disk: Path) -> None:
         compiler = shutil.which("cc")
         assert compiler is not None
-        source, library, step = folder / "clock.c", folder / "clock.so", folder / "clock.step"
-        source.write_text(_CLOCK, encoding="ascii")
+        source, library, state = folder / "calls.c", folder / "calls.so", folder / "calls.state"
+        source.write_text(_PRELOADED, encoding="ascii")
         command = [compiler, "-shared", "-fPIC", "-O1", "-o", str(library), str(source), "-ldl"]
         subprocess.run(command, check=True)
-        step.write_bytes(bytes(8))
-        self.variables = {"LD_PRELOAD": str(library), "CLOCK_STEP_FILE": str(step)}
-        with step.open("r+b") as file:
-            self._step = mmap.mmap(file.fileno(), 8)
+        state.write_bytes(bytes(16))
+        self.variables = {
+            "LD_PRELOAD": str(library),
+            "FAULTS_STATE": str(state),
+            "FAULTS_DISK": str(disk),
+        }
+        with state.open("r+b") as file:
+            self._state = mmap.mmap(file.fileno(), 16)
 
     def step_to(self, seconds: int) -> None:
-        """Let it be so far from the real time [s]."""
-        self._step[:] = struct.pack("q", seconds)
+        """Let the time of day be so far from the real one [s]."""
+        self._state[:8] = struct.pack("q", seconds)
+
+    def fail_writes(self, fail: bool) -> None:
+        """Let writes to the disk fail with an input/output error, or succeed again."""
+        self._state[8:] = struct.pack("q", fail)
 
 
 class Disk:
@@ -160,6 +203,50 @@ class Network:
     def close(self) -> None:
         """Remove it, with its cables."""
         _run("ip", "netns", "del", self.name)
+
+
+class Receiver:
+    """A receiver of notifications on this machine. Use it as a context manager.
+
+    Attributes:
+        jobs: Those about which it took one.
+        slow: Whether it answers a byte every two seconds, without end.
+    """
+
+    def __init__(self) -> None:
+        self.jobs: set[str] = set()
+        self.slow = False
+        receiver = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_POST(self) -> None:
+                body = self.rfile.read(int(self.headers["Content-Length"]))
+                if receiver.slow:
+                    with suppress(OSError):
+                        self.wfile.write(b"HTTP/1.1 204 No Content\r\nX-Slow: ")
+                        while receiver.slow:
+                            self.wfile.write(b"a")
+                            time.sleep(2.0)
+                    return
+                receiver.jobs.add(json.loads(body)["data"]["id"])
+                self.send_response(204)
+                self.end_headers()
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server.daemon_threads = True
+        self.host = f"127.0.0.1:{self._server.server_port}"
+
+    def __enter__(self) -> Self:
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.slow = False
+        self._server.shutdown()
+        self._server.server_close()
 
 
 _PIDS: Final = Path("/sys/fs/cgroup/pids")

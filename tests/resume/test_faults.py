@@ -51,7 +51,8 @@ def test_the_campaign_sees_a_single_bit_that_differs(tmp_path: Path) -> None:
 KINDS_OF: dict[DatabaseKind, list[str]] = {
     "sqlite": [
         *("kill-runner", "kill-api", "stop-runner", "database-locked", "disk-full", "clock-step"),
-        *("fork-refused", "out-of-memory"),
+        *("fork-refused", "out-of-memory", "clock-step-kill", "disk-error", "file-replaced"),
+        "slow-receiver",
     ],
     "postgresql": ["kill-postgresql", "partition"],
 }
@@ -59,7 +60,7 @@ KINDS_OF: dict[DatabaseKind, list[str]] = {
 
 
 @pytest.mark.thorough(
-    "ten kinds of faults with all processes of a deployment",
+    "fourteen kinds of faults with all processes of a deployment",
     "test_resumed_job_equals_one_never_killed",
     "test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history",
 )

@@ -13,6 +13,7 @@ from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import mean_of_greatest
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Judgement, Preference
 from gaitswarm.services.optimizer.views import (
     DesignValues,
@@ -314,14 +315,7 @@ def proportion(happened: NDArray[np.bool_]) -> ProportionView:
 
 def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
     """Mean of the worst of (n,) values (Rockafellar and Uryasev 2002), the greatest being worst."""
-    ordered = np.sort(values)[::-1].tolist()
-    size = max((1.0 - level) * len(ordered), 1.0)
-    whole = math.floor(size + 1e-9)
-    part = size - whole
-    total = math.fsum(ordered[:whole])
-    if part > 1e-9:
-        total += part * ordered[whole]
-    return total / size
+    return mean_of_greatest(np.sort(values)[::-1].tolist(), max((1.0 - level) * len(values), 1.0))
 
 
 def _spread(values: Floats) -> SpreadView:

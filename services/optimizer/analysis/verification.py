@@ -52,8 +52,7 @@ class BrokenChain(Exception):
 
     def __init__(self, iteration: int, problem: str) -> None:
         super().__init__(f"iteration {iteration}: {problem}")
-        self.iteration = iteration
-        self.problem = problem
+        self.iteration, self.problem = iteration, problem
 
 
 @dataclass(slots=True)
@@ -148,38 +147,6 @@ def check_history(store: Store, job: Job, *, head: str | None = None) -> History
 Stored = tuple[Link, EvaluationColumns, Reevaluation | None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Piece:
-    """Rows of a range of iterations, as stored."""
-
-    links: dict[int, Link]
-    columns: EvaluationColumns | None
-    reevaluations: tuple[tuple[int, Reevaluation], ...]
-
-    @classmethod
-    def read(cls, store: Store, job_id: str, first: int, last: int) -> _Piece:
-        """Raises one of _UNREADABLE for damaged rows."""
-        return cls(
-            {link.iteration: link for link in store.links(job_id, first, last)},
-            store.evaluation_columns(job_id, first, last),
-            store.reevaluations(job_id, first, last),
-        )
-
-    def iteration(self, index: int) -> Stored:
-        """Raises BrokenChain."""
-        link = self.links.get(index)
-        if link is None or not link.committed:
-            raise BrokenChain(index, "it is missing")
-        columns = None if self.columns is None else self.columns.of_iteration(index)
-        asked = np.arange(len(link.positions))
-        if columns is None or not np.array_equal(columns.particle, asked):
-            raise BrokenChain(index, "its particles differ from those asked for")
-        reevaluations = [entry for iteration, entry in self.reevaluations if iteration == index]
-        if len(reevaluations) > 1:
-            raise BrokenChain(index, "several of its designs were reevaluated")
-        return link, columns, reevaluations[0] if reevaluations else None
-
-
 def _stored(store: Store, job: Job) -> Iterator[Stored]:
     """Yield a job's committed iterations, in order. Raises BrokenChain."""
     end = job.progress.iterations
@@ -190,15 +157,28 @@ def _stored(store: Store, job: Job) -> Iterator[Stored]:
 
 def _between(store: Store, job_id: str, first: int, last: int) -> Iterator[Stored]:
     try:
-        piece = _Piece.read(store, job_id, first, last)
+        links = {link.iteration: link for link in store.links(job_id, first, last)}
+        columns = store.evaluation_columns(job_id, first, last)
+        reevaluations = store.reevaluations(job_id, first, last)
     except _UNREADABLE as error:
         if last == first + 1:
             raise BrokenChain(first, f"it cannot be read: {str(error)[:200]}") from error
         # Locate the damage.
         for index in range(first, last):
             yield from _between(store, job_id, index, index + 1)
-    else:
-        yield from (piece.iteration(index) for index in range(first, last))
+        return
+    for index in range(first, last):
+        link = links.get(index)
+        if link is None or not link.committed:
+            raise BrokenChain(index, "it is missing")
+        designs = None if columns is None else columns.of_iteration(index)
+        asked = np.arange(len(link.positions))
+        if designs is None or not np.array_equal(designs.particle, asked):
+            raise BrokenChain(index, "its particles differ from those asked for")
+        again = [entry for iteration, entry in reevaluations if iteration == index]
+        if len(again) > 1:
+            raise BrokenChain(index, "several of its designs were reevaluated")
+        yield link, designs, again[0] if again else None
 
 
 def _check_ask(link: Link) -> None:

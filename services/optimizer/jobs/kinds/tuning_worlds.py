@@ -113,7 +113,9 @@ class TuningWorlds(BaseModel):
             return ordered[min(math.floor(tail + _EDGE), self.count - 1)]
         if self.aggregate == "worst" or math.isinf(ordered[0]):
             return ordered[0]
-        return _log_mean(ordered, self.count if self.aggregate == "mean" else max(1.0, tail))
+        size = self.count if self.aggregate == "mean" else max(1.0, tail)
+        utilities = [math.exp(value - ordered[0]) for value in ordered]
+        return ordered[0] + math.log(mean_of_greatest(utilities, size))
 
 
 def _bounded(perturbation: Variable, custom: Variable) -> Variable:
@@ -131,17 +133,13 @@ def _bounded(perturbation: Variable, custom: Variable) -> Variable:
         raise ValueError(f"ranges: {message}") from error
 
 
-def _log_mean(ordered: Sequence[float], size: float) -> float:
-    """Logarithm of the mean of the greatest `size` values, the last possibly in part.
-
-    ordered: their logarithms, descending.
-    """
+def mean_of_greatest(ordered: Sequence[float], size: float) -> float:
+    """Mean of the first `size` of descending values, the last possibly in part."""
     whole = math.floor(size + _EDGE)
-    terms = [math.exp(value - ordered[0]) for value in ordered[: whole + 1]]
-    total = math.fsum(terms[:whole])
+    total = math.fsum(ordered[:whole])
     if size - whole > _EDGE:
-        total += (size - whole) * terms[whole]
-    return ordered[0] + math.log(total / size)
+        total += (size - whole) * ordered[whole]
+    return total / size
 
 
 @lru_cache(maxsize=32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
@@ -25,7 +25,15 @@ from gaitswarm.services.optimizer.jobs.estimate import (
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.job import Claim, Job, Quota, check_priority, refusal
+from gaitswarm.services.optimizer.jobs.job import (
+    DEFAULT_PRIORITY,
+    Claim,
+    Job,
+    Quota,
+    Submission,
+    check_priority,
+    refusal,
+)
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
@@ -34,9 +42,6 @@ from gaitswarm.sim.identification import RecordedWalk
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
-
-_PAGE: Final = 5000
-"""Iterations read at a time."""
 
 _RECENT_JOBS: Final = 50
 """Newest jobs among which the estimate looks for similar ones."""
@@ -71,28 +76,20 @@ class JobService:
         self,
         spec: Spec,
         *,
-        idempotency_key: str | None = None,
         request: Any = None,
-        owner: str | None = None,
-        notify_url: str | None = None,
-        quota: Quota | None = None,
-        priority: int = 0,
+        **submission: Unpack[Submission],
     ) -> tuple[Job, bool]:
         """Validate a job, check that it can be simulated, and queue it."""
-        check_priority(priority)
+        check_priority(submission.get("priority", DEFAULT_PRIORITY))
         seconds = self._check(spec)
         if request is None:
             request = spec.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
             with_start_designs(spec, self.job, self.columns),
             provenance=self.provenance(spec),
-            idempotency_key=idempotency_key,
             request=request,
-            owner=owner,
-            notify_url=notify_url,
             seconds=seconds,
-            quota=quota,
-            priority=priority,
+            **submission,
         )
 
     def fork(
@@ -100,15 +97,11 @@ class JobService:
         job_id: str,
         request: ForkRequest,
         *,
-        idempotency_key: str | None = None,
         sent: Any = None,
-        owner: str | None = None,
-        notify_url: str | None = None,
-        quota: Quota | None = None,
-        priority: int = 0,
+        **submission: Unpack[Submission],
     ) -> tuple[Job, bool]:
         """Queue a job that begins with iterations of another one."""
-        check_priority(priority)
+        check_priority(submission.get("priority", DEFAULT_PRIORITY))
         job = self.job(job_id)
         check_begun(job, request.from_iteration)
         columns = self.columns(job)
@@ -129,14 +122,10 @@ class JobService:
         return self.store.create_job(
             spec,
             provenance=self.provenance(spec),
-            idempotency_key=idempotency_key,
             request={"fork": job_id, "request": sent},
             fork=fork,
-            owner=owner,
-            notify_url=notify_url,
             seconds=seconds,
-            quota=quota,
-            priority=priority,
+            **submission,
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
-from typing import Final
+from typing import Final, TypedDict
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, QuotaExceeded, Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -67,6 +67,16 @@ class Quota:
                 " iterations, wait until a job ends, cancel one, or ask an admin",
                 field="iterations",
             )
+
+
+class Submission(TypedDict, total=False):
+    """What may accompany a new job; see `Store.create_job`."""
+
+    idempotency_key: str | None
+    owner: str | None
+    notify_url: str | None
+    quota: Quota | None
+    priority: int
 
 
 class JobState(StrEnum):

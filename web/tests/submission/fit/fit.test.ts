@@ -12,16 +12,13 @@ import { choiceOf, idsIn } from '../../../src/submission/fit/recordings/recordin
 import { calibrationSpec, nextKey, withRecordings } from '../../../src/submission/fit/targets'
 import { CATALOGUE } from '../catalogue-example'
 
-test('a stored recording is offered with a description, and refused if unreadable', () => {
+test('a stored recording is offered with a description', () => {
   const stored = { id: '0f343b0931126a20', created_at: '2026-03-01T10:00:00Z', size: 206113 }
   const walk = { scenario: 'slope', controller: 'pi', joints: 18, rate: 500, seconds: 3 }
   const choice = choiceOf({ ...stored, ...walk, rows: 1500, synthetic: true })
   expect([choice.value, choice.label]).toEqual([stored.id, '3.00 s of slope with pi'])
   expect(choice.note).toContain('0f343b093112 · 2026-03-01')
   expect(choice.note).toContain('18 joints · 500 rows per second · 206 kB · synthetic')
-  const nothing = { scenario: null, controller: null, joints: null, rows: null, seconds: null }
-  const broken = choiceOf({ ...stored, ...nothing, rate: 500, synthetic: false })
-  expect(broken.refused).toContain('cannot be read')
 })
 
 test.each([

@@ -31,12 +31,8 @@ export function recordingSearch(exclude: readonly string[]): Search {
 
 export function choiceOf(recording: RecordingEntry): Choice {
   const { id, seconds, scenario, controller, joints, rate, size } = recording
-  const details = `${shortId(id)} · ${formatMoment(recording.created_at)}`
-  if (scenario === null || seconds === null) {
-    return { value: id, label: shortId(id), refused: `${details} · cannot be read` }
-  }
   const parts = [
-    details,
+    `${shortId(id)} · ${formatMoment(recording.created_at)}`,
     `${joints} joints`,
     `${formatNumber(rate, 3)} rows per second`,
     `${formatNumber(size / 1000, 3)} kB`,

@@ -23,7 +23,7 @@ from tests.store.postgres_server import postgres_binaries
 
 ROOT: Final = Path(__file__).parents[2]
 _COMMAND: Final = (sys.executable, "-u", "-c", "from gaitswarm.cli.main import main; main()")
-_MEBIBYTES: Final = {"sqlite": 48, "postgresql": 400}
+_MEBIBYTES: Final = {"sqlite": 400, "postgresql": 400}
 _RUNNERS: Final = 2
 
 DatabaseKind = Literal["sqlite", "postgresql"]

@@ -4,13 +4,14 @@
 
 Starts `gaitswarm serve` on a new SQLite database with finished jobs and one that runs in its
 process, opens the streams, and sends requests at a fixed rate. Latency counts from the
-time at which a request was due.
+time at which a request was due. Memory is what the server holds at ten times of the run.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import resource
 import subprocess
 import sys
 import tempfile
@@ -62,8 +63,14 @@ async def follow(client: httpx2.AsyncClient, job_id: str, events: list[int]) -> 
             events[0] += line.startswith("event:")
 
 
-async def measure(url: str, job_id: str, options: argparse.Namespace) -> None:
-    """Print the number of requests and quantiles of their latency by path."""
+def memory(pid: int) -> float:
+    """Return the resident memory of a process [MB]."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+async def measure(url: str, job_id: str, pid: int, options: argparse.Namespace) -> None:
+    """Print the number of requests, quantiles of their latency by path, and the server's memory."""
     job = f"/v1/jobs/{job_id}"
     paths = [
         *("/v1/jobs", "/v1/jobs?order=name", "/v1/jobs?search=job+7", "/v1/job-facets"),
@@ -82,12 +89,16 @@ async def measure(url: str, job_id: str, options: argparse.Namespace) -> None:
             latencies[path].append(time.perf_counter() - due)
 
         begun = time.perf_counter()
-        requests = []
-        for number in range(int(options.seconds * options.rate)):
+        requests, held = [], [memory(pid)]
+        count = int(options.seconds * options.rate)
+        for number in range(count):
+            if number * 10 // count == len(held):
+                held.append(memory(pid))
             due = begun + number / options.rate
             await asyncio.sleep(max(0.0, due - time.perf_counter()))
             requests.append(asyncio.create_task(ask(paths[number % len(paths)], due)))
         await asyncio.gather(*requests)
+        held.append(memory(pid))
         for stream in streams:
             stream.cancel()
     everything = {**latencies, "all": [s for some in latencies.values() for s in some]}
@@ -96,6 +107,7 @@ async def measure(url: str, job_id: str, options: argparse.Namespace) -> None:
         name = path.replace(job_id, "ID")
         print(f"{name:40} {len(seconds):6} p50 {p50:6.1f} p99 {p99:6.1f} max {longest:6.1f} ms")
     print(f"events received: {events[0]}")
+    print(f"memory: {' '.join(f'{size:.0f}' for size in held)} MB")
 
 
 def main() -> None:
@@ -109,7 +121,7 @@ def main() -> None:
         try:
             with httpx2.Client(base_url=url, timeout=60.0) as client:
                 job_id = fill(client, options.jobs)
-            asyncio.run(measure(url, job_id, options))
+            asyncio.run(measure(url, job_id, process.pid, options))
         finally:
             process.terminate()
             process.wait(timeout=90.0)

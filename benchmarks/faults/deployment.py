@@ -153,7 +153,6 @@ class Deployment:
             "listen_addresses": listen,
             "port": port,
             "unix_socket_directories": data,
-            "fsync": "off",
             "max_wal_size": "64MB",
             "shared_buffers": "16MB",
         }

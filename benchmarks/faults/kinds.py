@@ -255,15 +255,14 @@ class ClockStepAndKill(ClockStep):
 
 
 class DiskError(Fault):
-    """Every write to the database's disk is an input/output error."""
+    """Every write to the database's disk fails; PostgreSQL ends, and recovers at its restart."""
 
     name = "disk-error"
     shortest, longest = 0.5, 4.0
 
     @staticmethod
     def possible(deployment: Deployment) -> bool:
-        # PostgreSQL ends itself, and recovers, as when it is killed.
-        return deployment.calls is not None and deployment.server is None
+        return deployment.calls is not None
 
     def inject(self) -> None:
         assert self.deployment.calls is not None

@@ -54,13 +54,13 @@ KINDS_OF: dict[DatabaseKind, list[str]] = {
         *("fork-refused", "out-of-memory", "clock-step-kill", "disk-error", "file-replaced"),
         "slow-receiver",
     ],
-    "postgresql": ["kill-postgresql", "partition"],
+    "postgresql": ["kill-postgresql", "partition", "disk-error"],
 }
 """Tried with each database."""
 
 
 @pytest.mark.thorough(
-    "fourteen kinds of faults with all processes of a deployment",
+    "all kinds of faults with all processes of a deployment",
     "test_resumed_job_equals_one_never_killed",
     "test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history",
 )

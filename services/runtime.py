@@ -36,7 +36,6 @@ from gaitswarm.sim.outcome import Outcome
 if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
-    from gaitswarm.services.monitoring.tracing import Tracing
     from gaitswarm.services.worker.in_process import InProcessEvaluator
     from gaitswarm.services.worker.ray_evaluator import AutoEvaluator, RayEvaluator
 
@@ -73,8 +72,8 @@ def check_address(address: str | None) -> None:
         )
 
 
-Observe = Callable[[EvaluationRequest], AbstractContextManager[OnTask | None]]
-"""Observes one evaluation, and each of its tasks by the function in the block, if there is one."""
+Observe = Callable[[EvaluationRequest], AbstractContextManager[OnTask]]
+"""Observes one evaluation, and each of its tasks by the function in the block."""
 
 
 class ObservedEvaluator:
@@ -99,9 +98,9 @@ class ObservedEvaluator:
         with self._observe(request) as observe_task:
 
             def on_task(report: TaskReport) -> None:
-                for observer in (observe_task, request.on_task):
-                    if observer is not None:
-                        observer(report)
+                observe_task(report)
+                if request.on_task is not None:
+                    request.on_task(report)
 
             return self._inner.evaluate(replace(request, on_task=on_task), should_stop)
 
@@ -145,7 +144,6 @@ def open_runtime(
     longest_fork: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
-    tracing: Tracing | None = None,
     webhook_hosts: Collection[str] = (),
     webhook_secret: str | None = None,
     activity: Activity | None = None,
@@ -158,9 +156,6 @@ def open_runtime(
             from gaitswarm.services.monitoring.metrics import StoreMetrics  # noqa: PLC0415
 
             store.observers.append(StoreMetrics(metrics))
-        if tracing is not None:
-            stack.callback(tracing.close)
-            store.observers.append(tracing)
         if webhook_hosts:
             from gaitswarm.services.monitoring.webhooks import Notifier  # noqa: PLC0415
 
@@ -193,7 +188,7 @@ def open_runtime(
             watched = ObservedEvaluator(watched, activity.observed)
         runner = Runner(
             store,
-            watched if tracing is None else ObservedEvaluator(watched, tracing.observed),
+            watched,
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import logging
-import os
 import sys
 import threading
 from contextlib import ExitStack, suppress
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from gaitswarm.api.dependencies import Component
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
-    from gaitswarm.services.monitoring.tracing import Tracing
     from gaitswarm.services.optimizer.run.runner import Runner
     from gaitswarm.services.runtime import Runtime
     from gaitswarm.settings import Settings
@@ -252,24 +250,7 @@ def _runtime(
         longest_fork=settings.api_max_fork_seconds,
         should_stop=should_stop,
         metrics=metrics,
-        tracing=_tracing() if runs_jobs else None,
         webhook_hosts=settings.webhook_hosts,
         webhook_secret=settings.webhook_secret,
         activity=activity,
     )
-
-
-def _tracing() -> Tracing | None:
-    """Export spans if OpenTelemetry's variables name a collector."""
-    names = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
-    if not any(os.environ.get(name) for name in names):
-        return None
-    try:
-        from gaitswarm.services.monitoring.tracing import exporting_tracing
-    except ModuleNotFoundError as error:
-        # The variables may be meant for other programs.
-        logging.getLogger(__name__).warning(
-            "spans are not exported, %s is missing: install gaitswarm[telemetry]", error.name
-        )
-        return None
-    return exporting_tracing()

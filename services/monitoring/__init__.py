@@ -1,1 +1,1 @@
-"""Metrics, traces, activity and notifications of a process"""
+"""Metrics, activity and notifications of a process"""

@@ -7,7 +7,6 @@ from gaitswarm.services.optimizer.store.engine import (
     Clock,
     Database,
     Observer,
-    check_file_system,
     database_time,
     parse_url,
 )
@@ -97,7 +96,6 @@ def open_store(url: str, *, clock: Clock = database_time) -> Store:
         StoreUnavailable: the database cannot be used.
     """
     parsed = parse_url(url)
-    check_file_system(parsed)
     create(parsed)
     database = Database(parsed)
     admit(database)

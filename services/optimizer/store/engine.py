@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import socket
 import sqlite3
 import threading
@@ -13,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing, contextmanager
 from datetime import UTC, datetime
 from functools import partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, Final, Protocol
 
 import sqlalchemy as sa
@@ -46,18 +45,9 @@ IDLE_SECONDS: Final = 20
 STATEMENT_SECONDS: Final = 120
 """Longest statement; none takes as long on histories of any length."""
 
-MOUNTS: Final = Path("/proc/self/mountinfo")
-
 _PROBES: Final = 2
 _CACHE_KIB: Final = 8192
 _WRITE: Final = "gaitswarm_write"
-
-_NETWORK: Final = re.compile(
-    r"nfs4?|cifs|smb3|smbfs|afs|ncpfs|9p|ceph|lustre|gpfs|beegfs|glusterfs|orangefs|pvfs2|davfs"
-    r"|fuse\.(sshfs|.*nfs|.*smb.*|.*ceph.*|gluster.*|.*s3.*|gcsfuse|blobfuse2?|rclone|davfs2?"
-    r"|juicefs)"
-)
-"""File systems of other machines, as the kernel calls them; 9p: a virtual machine's host."""
 
 Clock = Callable[[sa.Connection], datetime]
 """Returns the aware time inside a transaction."""
@@ -394,49 +384,6 @@ def _identity(path: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return status.st_dev, status.st_ino
-
-
-def check_file_system(url: sa.URL) -> None:
-    """Refuse an SQLite file on a network file system, where SQLite loses writes.
-
-    The write-ahead log is memory shared between processes, and locks are those of the file system,
-    which network file systems lack. Only Linux lists mounts. Raises StoreUnavailable.
-    """
-    if url.get_backend_name() != "sqlite":
-        return
-    file = Path(str(url.database))
-    try:
-        mounts = MOUNTS.read_text(encoding="utf-8", errors="surrogateescape")
-        path = file.resolve()
-    except (OSError, RuntimeError):
-        return
-    point, kind = mount_of(PurePosixPath(path), mounts)
-    if is_network(point, kind):
-        raise StoreUnavailable(
-            f"database {file} is on {point}, a {kind} file system, on which SQLite can lose what is"
-            " written; name a file on a local disk with --db or GAITSWARM_DB, or for several"
-            " machines a postgresql:// database"
-        )
-
-
-def mount_of(path: PurePosixPath, mounts: str) -> tuple[PurePosixPath, str]:
-    """Return mount point and kind of the innermost, latest mount of /proc/self/mountinfo."""
-    innermost, innermost_kind = PurePosixPath(), ""
-    for line in mounts.splitlines():
-        fields, separator, rest = line.partition(" - ")
-        if separator:
-            # The kernel writes spaces and the like as octal numbers.
-            name = re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), fields.split()[4])
-            point = PurePosixPath(name)
-            if path.is_relative_to(point) and len(point.parts) >= len(innermost.parts):
-                innermost, innermost_kind = point, rest.split()[0]
-    return innermost, innermost_kind
-
-
-def is_network(point: PurePosixPath, kind: str) -> bool:
-    # The root of a sandbox such as gVisor is local.
-    sandbox = kind == "9p" and point == PurePosixPath("/")
-    return not sandbox and _NETWORK.fullmatch(kind) is not None
 
 
 def _postgresql_engine(url: sa.URL, options: dict[str, Any], *, unlimited: bool) -> sa.Engine:

@@ -35,7 +35,6 @@ from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.store.engine import (
     Database,
-    check_file_system,
     database_time,
     parse_url,
 )
@@ -97,7 +96,6 @@ def restore(url: str, file: Path, *, overwrite: bool = False) -> None:
     if not file.is_file():
         raise NotFound(f"there is no backup {file}")
     parsed = parse_url(url)
-    check_file_system(parsed)
     target = Path(str(parsed.database)) if parsed.get_backend_name() == "sqlite" else None
     if target is not None and target.exists() and not overwrite:
         raise Conflict(f"database {target} exists already; --force replaces all that it holds")

@@ -16,7 +16,6 @@ from sqlalchemy.exc import DBAPIError
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
 from gaitswarm.services.optimizer.store.engine import (
     Database,
-    check_file_system,
     database_time,
     parse_url,
 )
@@ -148,7 +147,6 @@ def upgrade(url: str) -> str | None:
         StoreUnavailable: it cannot be opened or migrated, or a newer gaitswarm made it.
     """
     parsed = parse_url(url)
-    check_file_system(parsed)
     with closing(Database(parsed, for_migration=True)) as database:
         with database.read() as connection:
             before = read_revision(connection)

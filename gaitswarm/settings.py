@@ -207,8 +207,7 @@ class Settings(BaseModel):
         default=0.5,
         gt=0.0,
         le=60.0,
-        description="How often jobs that event streams follow are looked at, all at once, where the"
-        " database tells of no changes: SQLite, or a PostgreSQL whose listener is lost [s].",
+        description="How often jobs that event streams follow are looked at, all at once [s].",
     )
     api_compute_workers: int = Field(
         default=2,

@@ -8,17 +8,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing
 
 import pytest
-from sqlalchemy import text
 
 from gaitswarm.services.optimizer.jobs.job import Command
 from gaitswarm.services.optimizer.store import Store, open_store
-from gaitswarm.services.optimizer.store.engine import Database
 from tests.examples.processes import eventually
 from tests.store.examples import LEASE, ask, begun, completed, spec
 from tests.store.postgres_server import PostgresServer
 
-NEVER = 3600.0
-"""Seconds between polls that no test waits for."""
+POLL_SECONDS = 0.02
 
 
 @pytest.fixture
@@ -28,38 +25,18 @@ def waiting(database_url: str) -> Iterator[Store]:
         yield store
 
 
-@pytest.fixture
-def poll_seconds(database_url: str) -> float:
-    """PostgreSQL notifies of changes, so that polling is not needed."""
-    return NEVER if database_url.startswith("postgresql") else 0.02
-
-
-def listening(url: str) -> list[int]:
-    """Process ids of the server's connections that listen."""
-    query = text("SELECT pid FROM pg_stat_activity WHERE query LIKE 'LISTEN%'")
-    with (
-        closing(Database(url)) as database,
-        database.read() as connection,
-    ):
-        return list(connection.execute(query).scalars())
-
-
-def settle(url: str, waiting: Store, woken: threading.Event) -> None:
+def settle(waiting: Store, woken: threading.Event) -> None:
     """Wait until the watcher has polled once, which may wake without a change."""
-    if url.startswith("postgresql"):
-        eventually(lambda: len(listening(url)) == 1)
     eventually(woken.is_set)
     woken.clear()
     assert waiting.jobs().items
 
 
-def test_commits_and_commands_of_another_process_are_reported(
-    store: Store, waiting: Store, database_url: str, poll_seconds: float
-) -> None:
+def test_commits_and_commands_of_another_process_are_reported(store: Store, waiting: Store) -> None:
     claim = begun(store)
     woken = threading.Event()
-    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=poll_seconds):
-        settle(database_url, waiting, woken)
+    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=POLL_SECONDS):
+        settle(waiting, woken)
         store.commit(claim, completed(0), ask(1))
         assert woken.wait(10.0)
         woken.clear()
@@ -67,17 +44,15 @@ def test_commits_and_commands_of_another_process_are_reported(
         assert woken.wait(10.0)
 
 
-def test_what_a_job_waits_for_is_reported_once(
-    store: Store, waiting: Store, database_url: str, poll_seconds: float
-) -> None:
+def test_what_a_job_waits_for_is_reported_once(store: Store, waiting: Store) -> None:
     claim = begun(store)
     other, _ = store.create_job(spec())
     mine, theirs = threading.Event(), threading.Event()
     with (
-        waiting.changes.watch(claim.job.id, mine.set, poll_seconds=poll_seconds),
-        waiting.changes.watch(other.id, theirs.set, poll_seconds=poll_seconds),
+        waiting.changes.watch(claim.job.id, mine.set, poll_seconds=POLL_SECONDS),
+        waiting.changes.watch(other.id, theirs.set, poll_seconds=POLL_SECONDS),
     ):
-        settle(database_url, waiting, mine)
+        settle(waiting, mine)
         store.renew(claim, lease_seconds=LEASE, waiting="no route to host")
         assert mine.wait(10.0)
         mine.clear()
@@ -88,17 +63,15 @@ def test_what_a_job_waits_for_is_reported_once(
         assert not mine.is_set()
 
 
-def test_neither_heartbeats_nor_other_jobs_are_reported(
-    store: Store, waiting: Store, database_url: str, poll_seconds: float
-) -> None:
+def test_neither_heartbeats_nor_other_jobs_are_reported(store: Store, waiting: Store) -> None:
     claim = begun(store)
     other, _ = store.create_job(spec())
     mine, theirs = threading.Event(), threading.Event()
     with (
-        waiting.changes.watch(claim.job.id, mine.set, poll_seconds=poll_seconds),
-        waiting.changes.watch(other.id, theirs.set, poll_seconds=poll_seconds),
+        waiting.changes.watch(claim.job.id, mine.set, poll_seconds=POLL_SECONDS),
+        waiting.changes.watch(other.id, theirs.set, poll_seconds=POLL_SECONDS),
     ):
-        settle(database_url, waiting, mine)
+        settle(waiting, mine)
         store.renew(claim, lease_seconds=LEASE)
         store.command(other.id, Command.CANCEL)
         assert theirs.wait(10.0)
@@ -106,7 +79,7 @@ def test_neither_heartbeats_nor_other_jobs_are_reported(
 
 
 def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
-    store: Store, waiting: Store, database_url: str, poll_seconds: float
+    store: Store, waiting: Store
 ) -> None:
     jobs = [store.create_job(spec())[0] for _ in range(20)]
     woken = [threading.Event() for _ in jobs]
@@ -117,11 +90,9 @@ def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
     before = threads()
     with ExitStack() as watches:
         for job, event in zip(jobs, woken, strict=True):
-            watch = waiting.changes.watch(job.id, event.set, poll_seconds=poll_seconds)
+            watch = waiting.changes.watch(job.id, event.set, poll_seconds=POLL_SECONDS)
             watches.enter_context(watch)
         assert threads() == before + 1
-        if database_url.startswith("postgresql"):
-            eventually(lambda: len(listening(database_url)) == 1)
         for job, event in zip(jobs, woken, strict=True):
             event.clear()
             store.command(job.id, Command.CANCEL)
@@ -130,48 +101,8 @@ def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
     assert threads() == before
 
 
-@pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 @pytest.mark.slow
-def test_what_is_committed_while_the_listener_is_lost_is_reported_as_well(
-    store: Store, waiting: Store, database_url: str
-) -> None:
-    claim = begun(store)
-    woken = threading.Event()
-    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.2):
-        settle(database_url, waiting, woken)
-        (lost,) = listening(database_url)
-        with (
-            closing(Database(database_url)) as database,
-            database.write() as connection,
-        ):
-            connection.execute(text("SELECT pg_terminate_backend(:pid)"), {"pid": lost})
-        store.commit(claim, completed(0), ask(1))
-        assert woken.wait(10.0)
-        eventually(lambda: len(set(listening(database_url)) - {lost}) == 1)
-        woken.clear()
-        store.commit(claim, completed(1), ask(2))
-        assert woken.wait(10.0)
-
-
-@pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
-@pytest.mark.slow
-def test_without_a_listener_changes_are_polled_for(
-    store: Store, waiting: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        "gaitswarm.services.optimizer.store.changes._CHANNEL", "no name of a channel"
-    )
-    claim = begun(store)
-    woken = threading.Event()
-    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.02):
-        assert woken.wait(10.0)
-        woken.clear()
-        store.commit(claim, completed(0), ask(1))
-        assert woken.wait(10.0)
-
-
-@pytest.mark.slow
-def test_the_listener_is_back_after_a_crash_of_the_server(
+def test_changes_are_reported_again_after_a_crash_of_the_server(
     stoppable_server: PostgresServer,
 ) -> None:
     url = f"{stoppable_server.url}/postgres"
@@ -179,22 +110,19 @@ def test_the_listener_is_back_after_a_crash_of_the_server(
         claim = begun(store)
         woken = threading.Event()
         with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.2):
-            settle(url, waiting, woken)
+            settle(waiting, woken)
             stoppable_server.stop()
             stoppable_server.start()
             store.commit(claim, completed(0), ask(1))
             assert woken.wait(10.0)
-            eventually(lambda: len(listening(url)) == 1)
 
 
-def test_a_listener_that_has_left_receives_nothing(
-    store: Store, waiting: Store, database_url: str, poll_seconds: float
-) -> None:
+def test_a_listener_that_has_left_receives_nothing(store: Store, waiting: Store) -> None:
     claim = begun(store)
     left, stays = threading.Event(), threading.Event()
-    with waiting.changes.watch(claim.job.id, stays.set, poll_seconds=poll_seconds):
-        with waiting.changes.watch(claim.job.id, left.set, poll_seconds=poll_seconds):
-            settle(database_url, waiting, stays)
+    with waiting.changes.watch(claim.job.id, stays.set, poll_seconds=POLL_SECONDS):
+        with waiting.changes.watch(claim.job.id, left.set, poll_seconds=POLL_SECONDS):
+            settle(waiting, stays)
         left.clear()
         store.commit(claim, completed(0), ask(1))
         assert stays.wait(10.0)

@@ -62,11 +62,9 @@ def test_many_streams_of_a_job_have_every_iteration_once_and_in_order(
     store: Store, database_url: str
 ) -> None:
     claim = begun(store, iterations=ITERATIONS)
-    # On PostgreSQL nothing polls that often: the event comes from a notification.
-    poll_seconds = 60.0 if database_url.startswith("postgresql") else 0.02
     with (
         closing(open_store(database_url)) as served,
-        closing(Server(JobService(served), api_event_poll_seconds=poll_seconds)) as server,
+        closing(Server(JobService(served), api_event_poll_seconds=0.02)) as server,
         ThreadPoolExecutor(STREAMS) as pool,
     ):
         opened = threading.Semaphore(0)

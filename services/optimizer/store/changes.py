@@ -3,41 +3,22 @@
 from __future__ import annotations
 
 import logging
-import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import select
 
-from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.services.optimizer.store.tables import EXISTING, jobs
-
-_CHANNEL: Final = "gaitswarm_jobs"
-
-_ANNOUNCED: Final = frozenset({"state", "iterations", "waiting"})
-"""Columns of jobs whose changes wake watchers."""
-
-_NOTIFY_SECONDS: Final = 0.5
-"""Longest wait for notifications before the listener checks whether to stop."""
-
-_LISTEN_SECONDS: Final = 15.0
-"""Interval of polls while listening."""
 
 _STUCK_SECONDS: Final = 120.0
 """Silence after which the thread counts as stuck; polls may be 60 s apart."""
 
 _log = logging.getLogger(__name__)
-
-
-def announce(connection: Connection, job_id: str, columns: frozenset[str]) -> None:
-    """Notify PostgreSQL's listeners of changed columns when the transaction is committed."""
-    if connection.dialect.name == "postgresql" and not _ANNOUNCED.isdisjoint(columns):
-        connection.execute(select(func.pg_notify(_CHANNEL, job_id)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,11 +29,7 @@ class _Watcher:
 
 
 class Changes:
-    """Changes of jobs. Thread-safe; one thread and one connection for all watchers of a process.
-
-    On PostgreSQL the connection listens for announcements; while it is lost, and on SQLite, one
-    query polls all watched jobs.
-    """
+    """Changes of jobs. Thread-safe; one thread and one query poll all watched jobs of a process."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -75,18 +52,14 @@ class Changes:
         Args:
             job_id: of a job, which need not exist.
             wake: called in another thread; must return at once.
-            poll_seconds: longest delay where the database does not notify [s].
+            poll_seconds: longest delay [s].
         """
         watcher = _Watcher(job_id, wake, poll_seconds)
         with self._condition:
             self._watchers.add(watcher)
             if self._thread is None:
-                self._stop = threading.Event()
                 self._looked = time.monotonic()
-                arguments = (self._stop,)
-                self._thread = threading.Thread(
-                    target=self._run, args=arguments, name="changes", daemon=True
-                )
+                self._thread = threading.Thread(target=self._run, name="changes", daemon=True)
                 self._thread.start()
             self._condition.notify_all()
         try:
@@ -116,18 +89,15 @@ class Changes:
         if thread is not None:
             thread.join()
 
-    def _run(self, stop: threading.Event) -> None:
-        listens = self._database.path is None
+    def _run(self) -> None:
         failing = False
         while True:
             with self._condition:
-                self._condition.wait_for(lambda: self._watchers or stop.is_set())
+                self._condition.wait_for(lambda: self._watchers or self._stop.is_set())
                 self._looked = time.monotonic()
-            if stop.is_set():
+            if self._stop.is_set():
                 return
             try:
-                if listens:
-                    self._listen(stop)
                 self._poll()
                 failing = False
             except Exception as error:  # noqa: BLE001 - watchers depend on this thread
@@ -135,31 +105,10 @@ class Changes:
                     cause = self._database.without_secrets(str(error))
                     _log.warning("polling for changes of jobs: %s", cause)
                 failing = True
-                with suppress(StoreUnavailable):
-                    self._poll()
             with self._condition:
-                if not stop.is_set():
+                if not self._stop.is_set():
                     intervals = [watcher.poll_seconds for watcher in self._watchers]
                     self._condition.wait(min(intervals, default=None))
-
-    def _listen(self, stop: threading.Event) -> None:
-        """Report announcements until stopped. Raises when the connection is lost."""
-        engine = self._database.engine.execution_options(isolation_level="AUTOCOMMIT")
-        with engine.connect() as connection:
-            driver: Any = connection.connection.driver_connection
-            # It listens until it is closed, so it must not return to the pool.
-            connection.detach()
-            connection.exec_driver_sql(f"LISTEN {_CHANNEL}")
-            polled = -math.inf
-            while not stop.is_set():
-                self._looked = time.monotonic()
-                if self._looked - polled > _LISTEN_SECONDS:
-                    # Also for commits before the first LISTEN.
-                    self._poll()
-                    polled = self._looked
-                with closing(driver.notifies(timeout=_NOTIFY_SECONDS)) as announcements:
-                    for announcement in announcements:
-                        self._wake({announcement.payload})
 
     def _poll(self) -> None:
         """Wake watchers of jobs that changed since the last poll."""
@@ -169,12 +118,9 @@ class Changes:
         with self._database.read() as connection:
             query = select(*columns).where(jobs.c.id.in_(watched), EXISTING)
             rows = connection.execute(query).all()
-        found = dict.fromkeys(watched) | {row.id: tuple(row) for row in rows}
-        changed = {job for job in watched if job not in self._seen or self._seen[job] != found[job]}
-        self._seen = found
-        self._wake(changed)
-
-    def _wake(self, changed: set[str]) -> None:
+        states = dict.fromkeys(watched) | {row.id: tuple(row) for row in rows}
+        changed = {j for j in watched if j not in self._seen or self._seen[j] != states[j]}
+        self._seen = states
         with self._condition:
             watchers = [watcher for watcher in self._watchers if watcher.job_id in changed]
         for watcher in watchers:

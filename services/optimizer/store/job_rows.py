@@ -23,7 +23,6 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress, Unrea
 from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.jobs.reference import Reference
-from gaitswarm.services.optimizer.store.changes import announce
 from gaitswarm.services.optimizer.store.tables import (
     EXISTING,
     Row,
@@ -111,7 +110,6 @@ def _row(connection: Connection, job_id: str, query: Select[Any]) -> SqlRow[Any]
 def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
     """Change a locked job and return its row; a job that ends leaves a notification."""
     connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
-    announce(connection, row["id"], frozenset(columns))
     after = {**row, **columns}
     if after["notify_url"] is not None and "state" in columns and after["finished_at"] is not None:
         _add_notification(connection, after)

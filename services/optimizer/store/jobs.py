@@ -43,7 +43,6 @@ from gaitswarm.services.optimizer.jobs.listing import folded, storable
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.store.changes import announce
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import take_history
 from gaitswarm.services.optimizer.store.job_rows import (
@@ -482,7 +481,6 @@ def _mark_deleted(connection: Connection, ids: Collection[str], now: datetime, a
     gone = {"deleted_at": now, "idempotency_key": None, "request_digest": None}
     connection.execute(update(jobs).where(jobs.c.id.in_(ids)).values(**gone))
     for job_id in ids:
-        announce(connection, job_id, frozenset({"state"}))
         note_change(connection, now, actor, AuditAction.DELETE, job_id)
 
 

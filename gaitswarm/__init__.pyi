@@ -7,7 +7,6 @@ from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
 from gaitswarm.optimization import OptimizationResult, optimize, optimizers
-from gaitswarm.replay import WalkReplay
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
@@ -93,7 +92,7 @@ __all__ = [
     "ScenarioFamiliesView", "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
-    "Variable", "VerificationView", "WalkLog", "WalkReplay", "__version__", "connect",
+    "Variable", "VerificationView", "WalkLog", "__version__", "connect",
     "connect_async", "job_spec", "open", "open_async", "optimize", "optimizers", "robustness",
     "simulate", "verify", "write_firmware",
 ]  # fmt: skip

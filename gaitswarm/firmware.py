@@ -6,18 +6,15 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, TypedDict, Unpack
+from typing import Final, TypedDict, Unpack
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from gaitswarm.designs import ScenariosRequest
-from gaitswarm.errors import invalid_request, simulation_errors
+from gaitswarm.errors import simulation_errors
 from gaitswarm.robots import replaced_folder
-from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
-from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.views import Finite, View
-from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.firmware.folder import (
@@ -31,7 +28,6 @@ from gaitswarm.sim.firmware.folder import (
 from gaitswarm.sim.firmware.microcontroller import BUDGET
 from gaitswarm.sim.input import Line
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
-from gaitswarm.views.job import BestView
 
 _BUILT: Final = "build"
 """Build folder of the folder's Makefile."""
@@ -85,34 +81,6 @@ class FirmwareRequest(ScenariosRequest):
         if self.table_bits is not None:
             with simulation_errors("table_bits"):
                 check_table_bits(self.controller, self.table_bits)
-
-
-def firmware_request_of_best(
-    job_id: str, spec: AnySpec, best: BestView | None, options: dict[str, Any]
-) -> FirmwareRequest:
-    """Request firmware of a job's best design, by default for its robot and scenarios."""
-    if not isinstance(spec, JobSpec):
-        raise InvalidRequest(
-            f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="job_id"
-        )
-    if options.get("controller", spec.controller) != spec.controller:
-        raise InvalidRequest(
-            f"job {job_id} tunes {spec.controller}; leave it out", field="controller"
-        )
-    if best is None:
-        raise NotFound(f"job {job_id} has no design yet that walks in every scenario")
-    document = {
-        "robot": spec.robot,
-        "controller": spec.controller,
-        "design": design_numbers(spec.controller, best.design),
-        "scenarios": spec.resolved_scenarios(),
-        "label": spec.name or f"job {job_id}",
-        **options,
-    }
-    try:
-        return FirmwareRequest.model_validate(document)
-    except ValidationError as error:
-        raise invalid_request(error) from error
 
 
 def run_firmware(request: FirmwareRequest) -> Firmware:

@@ -7,11 +7,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gaitswarm.designs import resolved
+from gaitswarm.designs import SimulationRequest, resolved
 from gaitswarm.firmware import (
     FirmwareRequest,
     FirmwareView,
-    firmware_request_of_best,
     firmware_view,
     run_firmware,
 )
@@ -33,8 +32,10 @@ from gaitswarm.recordings import (
     RecordingView,
     read_measured_walk,
 )
+from gaitswarm.replay import ReplayRequest, run_replay
 from gaitswarm.robots import RobotCheckView, RobotDraftRequest, RobotDraftView, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
+from gaitswarm.robustness_index import RobustnessRequest, RobustnessView, run_robustness
 from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView, convergence
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView, encoded_particles
 from gaitswarm.services.optimizer.analysis.distribution import distribution as spread
@@ -43,11 +44,16 @@ from gaitswarm.services.optimizer.analysis.reference import (
     ReferenceView,
     with_reference,
 )
+from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
+from gaitswarm.sim.catalogue import design_numbers
+from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.firmware.folder import parsed_table_bits
 from gaitswarm.sim.robot import RobotFiles
+from gaitswarm.simulation import SimulationView, run_simulation
+from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,
@@ -65,7 +71,7 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.job import BestView, JobFacetsView
+from gaitswarm.views.job import JobFacetsView
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import zipped
@@ -223,12 +229,80 @@ class ServedJobs(DatabaseJobs):
         return firmware_view(request, run_firmware(request))
 
     def _firmware_of_best(self, job_id: str, table_bits: str | None) -> FirmwareRequest:
-        job, best = self._service.job(job_id), self._service.store.best(job_id)
-        view = None if best is None else BestView.from_evaluation(best, job.spec)
-        bits = None if table_bits is None else parsed_table_bits(table_bits)
-        request = firmware_request_of_best(job.id, job.spec, view, {"table_bits": bits})
+        spec = tuning_spec(job_id, self._service.job(job_id).spec, "firmware")
+        request = FirmwareRequest(
+            robot=spec.robot,
+            controller=spec.controller,
+            design=design_numbers(spec.controller, self.best(job_id).design),
+            scenarios=spec.resolved_scenarios(),
+            label=spec.name or f"job {job_id}",
+            table_bits=None if table_bits is None else parsed_table_bits(table_bits),
+        )
         self._context.limits.check(request.walked_seconds, field="scenarios")
         return request
+
+    @analysis("POST /simulations", "simulate", "Simulate one design")
+    def simulate(self, design: SimulationRequest) -> SimulationView:
+        """Simulate one design in the given scenarios and return objectives, utilities and fitness.
+
+        Nothing is stored. The simulated time is limited, as the response waits for the simulations;
+        use a job to search.
+        """
+        seconds = design.simulated_seconds(design.resolved_scenarios())
+        self._context.limits.check(seconds, logged=design.log, field="scenarios")
+        return run_simulation(design)
+
+    @analysis("POST /robustness", "estimate_robustness", "Estimate the robustness of one design")
+    def robustness(self, design: RobustnessRequest) -> RobustnessView:
+        """Estimate how robust a design is, as `gaitswarm.robustness`.
+
+        The design and others around it are simulated, to estimate the norm of the Jacobian of the
+        objectives with respect to the variables, both normalized (thesis 4.4.3). Nothing is stored.
+        The simulated time is limited.
+
+        Returns:
+            The robustness index by scenario, objective and variable.
+        """
+        seconds = design.simulated_seconds(design.resolved_scenarios())
+        self._context.limits.check_sampled(seconds * (1 + design.samples))
+        return run_robustness(design)
+
+    @analysis("POST /replays", "replay", "Replay one simulation")
+    def replay(self, design: ReplayRequest) -> bytes:
+        """Simulate one design in one scenario and return the pose of every link, frame by frame.
+
+        A failed simulation is replayed up to its end, with its status in the header. Nothing is
+        stored; the simulated time is limited as for simulations with logs.
+
+        Returns:
+            Length of the header in bytes (uint32), the header (JSON, a ReplayHeaderView, padded
+            with spaces to a multiple of 4), then frame after frame of float32 numbers in the order
+            of the header's channels; all little-endian.
+        """
+        seconds = design.simulated_seconds([resolved(design.scenario)])
+        self._context.limits.check(seconds, logged=True, field="scenario")
+        return run_replay(design)
+
+    @analysis(
+        "POST /controllers/{controller}/surface",
+        "controller_surface",
+        "Get a fuzzy controller's surface",
+    )
+    def surface(self, controller: str, design: SurfaceRequest) -> SurfaceView:
+        """Compute a fuzzy controller's output over angle error and motor current.
+
+        Sets and rules are those of the thesis; the microcontroller uses the table instead of
+        inference.
+
+        Returns:
+            Sets, rules and the surfaces of every output, by the rules and by the lookup table.
+
+        Raises:
+            NotFound: No such controller.
+        """
+        if controller not in CONTROLLERS:
+            raise NotFound(CONTROLLERS.unknown(controller))
+        return run_surface(controller, design)
 
     @robots("GET /robots", "list_robots", "List robots")
     def list_robots(self) -> CatalogueView[RobotView]:

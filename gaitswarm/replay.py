@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -14,7 +13,7 @@ from pydantic import Field
 from gaitswarm.designs import WorldRequest, resolved
 from gaitswarm.meshes import urdf_digest
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.views import StatusName, View, finite, framed, unframed
+from gaitswarm.services.optimizer.views import StatusName, View, finite, framed
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from gaitswarm.sim.replay import CONTROL_RATE, Replay
@@ -258,32 +257,3 @@ def _frames(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float32]:
         rows = np.concatenate([c.reshape(len(c), -1) for c in columns], axis=1).astype("<f4")
     usable = np.isfinite(rows).all(axis=1)
     return rows if usable.all() else rows[: int(np.argmin(usable))]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WalkReplay:
-    """A decoded replay of F frames.
-
-    Attributes:
-        header: Scenario, status, objectives, and the robot with its links and shapes.
-        channels: Arrays (F, ...) by name, such as "link_pose" (F, links, 7) and "joint_angle"
-            (F, joints); `header.channels` has their units and labels.
-    """
-
-    header: ReplayHeaderView
-    channels: Mapping[str, NDArray[np.float32]]
-
-
-def decoded_replay(content: bytes) -> WalkReplay:
-    """Decode the result of `run_replay`."""
-    text, numbers = unframed(content)
-    header = ReplayHeaderView.model_validate_json(text)
-    frames = numbers.reshape(header.frames, -1)
-    channels = {
-        channel.name: frames[:, channel.offset : channel.offset + math.prod(channel.shape)]
-        for channel in header.channels
-    }
-    return WalkReplay(
-        header,
-        {c.name: channels[c.name].reshape(header.frames, *c.shape) for c in header.channels},
-    )

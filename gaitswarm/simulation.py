@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, Self, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View, finite
 from gaitswarm.sim.assembly import Backend
 from gaitswarm.sim.case import Case, MeasuredWalk
-from gaitswarm.sim.catalogue import design_catalogue, design_numbers, design_shown
+from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait.stability import Stability, static_stability
 from gaitswarm.sim.kernel.observation import WalkLog
@@ -100,37 +100,6 @@ class SimulationResult:
     utilities: Floats
     fitness: Floats
     logs: Mapping[str, tuple[WalkLog | None, ...]] = field(repr=False, default_factory=dict)
-
-    @classmethod
-    def from_view(cls, view: SimulationView) -> Self:
-        """Convert a server's answer to arrays.
-
-        Args:
-            view: Result of one design.
-        """
-        results = list(view.scenarios.values())
-        values = [[list(result.objectives.values()) for result in results]]
-        measured = [[getattr(r.measurements, m) for m in MEASUREMENT_NAMES] for r in results]
-        logs = {
-            name: (None if result.log is None else result.log.walk_log(),)
-            for name, result in view.scenarios.items()
-        }
-        recorded = any(log is not None for walks in logs.values() for log in walks)
-        return cls(
-            robot=view.robot,
-            controller=view.controller,
-            preference=view.preference,
-            precision=view.precision,
-            variables=tuple(view.design),
-            designs=np.array([list(design_numbers(view.controller, view.design).values())]),
-            scenarios=tuple(view.scenarios),
-            statuses=np.array([[Status.from_label(r.status) for r in results]], dtype=np.uint8),
-            objectives=np.array(values, dtype=np.float64),
-            measurements=np.array([measured], dtype=np.float64),
-            utilities=np.array([[result.utility for result in results]], dtype=np.float64),
-            fitness=np.array([view.fitness], dtype=np.float64),
-            logs=logs if recorded else {},
-        )
 
     @property
     def figure_of_merit(self) -> Floats:
@@ -235,11 +204,6 @@ class WalkLogView(View):
                 for name, (unit, description) in QUANTITIES.items()
             },
         )
-
-    def walk_log(self) -> WalkLog:
-        """The log as arrays."""
-        arrays = {name: np.array(c.values, np.float64) for name, c in self.columns.items()}
-        return WalkLog(**arrays)
 
 
 class MeasurementsView(View):

@@ -111,11 +111,6 @@ class AsyncJobs:
     record = _awaited(Jobs.record)
     recordings = _iterated(Jobs.recordings)
     recording = _awaited(Jobs.recording)
-    simulate = _awaited(Jobs.simulate)
-    robustness = _awaited(Jobs.robustness)
-    replay = _awaited(Jobs.replay)
-    surface = _awaited(Jobs.surface)
-    write_firmware = _awaited(Jobs.write_firmware)
 
     async def follow(
         self, job_id: str, *, after: int | None = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,15 +15,6 @@ from typing import Annotated, Any, Final, Self, TypeAlias, TypeVar, Unpack
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from gaitswarm.designs import SimulationRequest, resolved
-from gaitswarm.firmware import (
-    FirmwareOptions,
-    FirmwareRequest,
-    FirmwareView,
-    firmware_request_of_best,
-    firmware_view,
-    run_firmware,
-)
 from gaitswarm.jobs.operation import (
     After,
     AfterIteration,
@@ -40,12 +30,7 @@ from gaitswarm.jobs.operation import (
     robots,
 )
 from gaitswarm.recordings import RecordingEntryView, RecordingView
-from gaitswarm.replay import ReplayRequest, WalkReplay, decoded_replay, run_replay
 from gaitswarm.robustness_index import (
-    RobustnessOptions,
-    RobustnessRequest,
-    RobustnessView,
-    run_robustness,
     sampled_indices,
 )
 from gaitswarm.services.optimizer.analysis.certificate import (
@@ -113,23 +98,17 @@ from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter, LabelsC
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
-from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.simulation import SimulationResult, SimulationView, run_simulation
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
-    RobotInput,
-    ScenarioInput,
     SpecInput,
     SpecOptions,
     checked,
     chosen_spec,
     laid_options,
 )
-from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, encoded_table
 from gaitswarm.views.catalogue import CatalogueView
 from gaitswarm.views.job import (
@@ -144,7 +123,6 @@ from gaitswarm.views.job import (
 )
 from gaitswarm.views.verification import Digest, HistoryVerificationView
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
-from gaitswarm.zip_archive import unzipped, zipped
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
@@ -1259,245 +1237,6 @@ class Jobs(ABC):
             Conflict: The recording cannot be read.
         """
         return self._service.recording(recording_id)
-
-    def simulate(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        preference: PreferenceInput = "A",
-        precision: Precision = "double",
-        world: Mapping[str, float] | None = None,
-        log: bool = False,
-    ) -> SimulationResult:
-        """Simulate one design where the jobs are, with the arguments of `gaitswarm.simulate`.
-
-        Returns:
-            Arrays of one design.
-
-        Raises:
-            InvalidRequest: An argument is invalid, the gait leaves the legs' reach, or the
-                simulations are longer than the server allows.
-        """
-        document = {
-            "design": design,
-            "scenarios": scenarios,
-            "controller": controller,
-            "robot": robot,
-            "preference": preference,
-            "precision": precision,
-            "world": world,
-            "log": log,
-        }
-        view = self._simulation(checked(SimulationRequest, document))
-        return SimulationResult.from_view(view)
-
-    @analysis("POST /simulations", "simulate", "Simulate one design")
-    def _simulation(self, design: SimulationRequest) -> SimulationView:
-        """Simulate one design in the given scenarios and return objectives, utilities and fitness.
-
-        Nothing is stored. The simulated time is limited, as the response waits for the simulations;
-        use a job to search.
-        """
-        seconds = design.simulated_seconds(design.resolved_scenarios())
-        self._context.limits.check(seconds, logged=design.log, field="scenarios")
-        return run_simulation(design)
-
-    @analysis(
-        "POST /robustness",
-        "estimate_robustness",
-        "Estimate the robustness of one design",
-        body=RobustnessRequest,
-    )
-    def robustness(
-        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
-    ) -> RobustnessView:
-        """Estimate how robust a design is, as `gaitswarm.robustness`.
-
-        Where the jobs are, the design and others around it are simulated, to estimate the norm of
-        the Jacobian of the objectives with respect to the variables, both normalized (thesis
-        4.4.3). Nothing is stored. A server limits the simulated time.
-
-        Args:
-            design: As for `simulate`.
-            **options: Scenarios and sample, see `RobustnessOptions`.
-
-        Returns:
-            The robustness index by scenario, objective and variable.
-
-        Raises:
-            InvalidRequest: As `simulate`, or the sample is invalid.
-        """
-        request = RobustnessRequest(design=design, **options)
-        seconds = request.simulated_seconds(request.resolved_scenarios())
-        self._context.limits.check_sampled(seconds * (1 + request.samples))
-        return run_robustness(request)
-
-    def replay(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenario: ScenarioInput = "normal-fast",
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        world: Mapping[str, float] | None = None,
-        rate: float = 50.0,
-    ) -> WalkReplay:
-        """Simulate one design and return the pose of every link, frame by frame.
-
-        Args:
-            design: As for `simulate`.
-            scenario: Name or number of a preset, or `Scenario`.
-            controller: Motor controller that drives the robot.
-            robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-            world: As for `simulate`.
-            rate: Frames a second, 1 to 500 [Hz].
-
-        Returns:
-            Channels by name, one row a frame, up to the end of a failed simulation.
-
-        Raises:
-            InvalidRequest: As `simulate`.
-        """
-        document = {
-            "design": design,
-            "scenario": scenario,
-            "controller": controller,
-            "robot": robot,
-            "world": world,
-            "rate": rate,
-        }
-        return self._decoded(decoded_replay, self._replay(checked(ReplayRequest, document)))
-
-    @analysis("POST /replays", "replay", "Replay one simulation")
-    def _replay(self, design: ReplayRequest) -> bytes:
-        """Simulate one design in one scenario and return the pose of every link, frame by frame.
-
-        A failed simulation is replayed up to its end, with its status in the header. Nothing is
-        stored; the simulated time is limited as for simulations with logs.
-
-        Returns:
-            Length of the header in bytes (uint32), the header (JSON, a ReplayHeaderView, padded
-            with spaces to a multiple of 4), then frame after frame of float32 numbers in the order
-            of the header's channels; all little-endian.
-        """
-        seconds = design.simulated_seconds([resolved(design.scenario)])
-        self._context.limits.check(seconds, logged=True, field="scenario")
-        return run_replay(design)
-
-    @analysis(
-        "POST /controllers/{controller}/surface",
-        "controller_surface",
-        "Get a fuzzy controller's surface",
-        body=SurfaceRequest,
-    )
-    def surface(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        controller: ControllerName = "fuzzy-pi",
-        error_points: int = 65,
-        current_points: int = 33,
-        velocity_error: float = 0.0,
-    ) -> SurfaceView:
-        """Compute a fuzzy controller's output over angle error and motor current.
-
-        Sets and rules are those of the thesis; the microcontroller uses the table instead of
-        inference.
-
-        Args:
-            design: Value of each of the controller's variables, in their units.
-            controller: A fuzzy controller.
-            error_points: Points of the grid over the error's range, 3 to 129.
-            current_points: Points of the grid over the current's range, 2 to 65.
-            velocity_error: At which the surfaces of fuzzy-pi-3 are computed [counts/s].
-
-        Returns:
-            Sets, rules and the surfaces of every output, by the rules and by the lookup table.
-
-        Raises:
-            InvalidRequest: The controller is not fuzzy, or an argument is invalid.
-            NotFound: No such controller.
-        """
-        if controller not in CONTROLLERS:
-            raise NotFound(CONTROLLERS.unknown(controller))
-        request = SurfaceRequest(
-            design=design,
-            error_points=error_points,
-            current_points=current_points,
-            velocity_error=velocity_error,
-        )
-        return run_surface(controller, request)
-
-    def write_firmware(
-        self,
-        design: Mapping[str, float | str] | str,
-        output: str | os.PathLike[str],
-        **options: Unpack[FirmwareOptions],
-    ) -> FirmwareView:
-        """Write a design as C for the robot's microcontrollers; see `gaitswarm.write_firmware`.
-
-        It is computed where the jobs are, and the folder is written here.
-
-        Args:
-            design: As for `simulate`; or the identifier of a job, for its best design, robot and
-                scenarios.
-            output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
-            **options: Scenarios and tables, see `FirmwareOptions`.
-
-        Returns:
-            Files, their sizes, and their memory on the thesis's microcontroller.
-
-        Raises:
-            InvalidRequest: As `simulate`, or the job tunes no drive, or the folder holds anything
-                but firmware or cannot be written.
-            NotFound: No such job, or it has no feasible design yet.
-        """
-        from gaitswarm.firmware import check_replaceable, write_folder
-
-        if isinstance(design, str):
-            spec, best = self.job(design).spec, self.best(design)
-            request = firmware_request_of_best(design, spec, best, laid_options(options))
-        else:
-            request = checked(FirmwareRequest, {"design": design, **options})
-        check_replaceable(output)
-        view, files = self._firmware(request)
-        write_folder(output, files)
-        return view.model_copy(update={"folder": str(output)})
-
-    def _firmware(self, request: FirmwareRequest) -> tuple[FirmwareView, Mapping[str, bytes]]:
-        """Compute firmware and its description."""
-        return self._firmware_summary(request), self._decoded(
-            unzipped, self._firmware_archive(request)
-        )
-
-    @analysis(
-        "POST /firmware",
-        "write_firmware",
-        "Download one design as firmware",
-        media_type=ZIP,
-        filename="firmware.zip",
-    )
-    def _firmware_archive(self, request: FirmwareRequest) -> bytes:
-        """Return any design as C99 for a leg's microcontroller, with a test of its simulations.
-
-        Nothing is stored. The simulated time is limited, as the response waits for the simulations.
-
-        Returns:
-            The folder, as an archive.
-        """
-        self._context.limits.check(request.walked_seconds, field="scenarios")
-        return zipped(run_firmware(request).files)
-
-    @analysis("POST /firmware/summary", "summarize_firmware", "Summarize a design's firmware")
-    def _firmware_summary(self, request: FirmwareRequest) -> FirmwareView:
-        """Return files with sizes, tables, trajectories by scenario, and flash and RAM compared
-        with the thesis's microcontroller. Nothing is stored.
-        """
-        self._context.limits.check(request.walked_seconds, field="scenarios")
-        return firmware_view(request, run_firmware(request))
 
     @abstractmethod
     def close(self) -> None:

@@ -11,7 +11,6 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 from gaitswarm.errors import Interrupted, simulation_errors
-from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
 from gaitswarm.services.optimizer.analysis.history import read_columns, read_history
@@ -118,10 +117,6 @@ class DatabaseJobs(Jobs):
         """Delete a job, and remove all of its rows."""
         super().delete(job_id)
         self._service.store.purge_deleted()
-
-    def _firmware(self, request: FirmwareRequest) -> tuple[FirmwareView, Mapping[str, bytes]]:
-        firmware = run_firmware(request)
-        return firmware_view(request, firmware), firmware.files
 
     def run(
         self,

@@ -95,14 +95,3 @@ def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
     text += b" " * (-len(text) % 4)
     with np.errstate(over="ignore"):
         return struct.pack("<I", len(text)) + text + numbers.astype("<f4").tobytes()
-
-
-def unframed(content: bytes) -> tuple[bytes, NDArray[np.float32]]:
-    """Decode the result of `framed`."""
-    if len(content) < struct.calcsize("<I"):
-        raise ValueError("there is no header")
-    (length,) = struct.unpack_from("<I", content)
-    begin = struct.calcsize("<I") + length
-    if begin > len(content):
-        raise ValueError("the header is cut off")
-    return content[begin - length : begin], np.frombuffer(content, dtype="<f4", offset=begin)

@@ -81,8 +81,6 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/jobs/{job_id}/reference",
         "get /v1/jobs/{job_id}/activity",
         "get /v1/jobs/{job_id}/importance",
-        "post /v1/firmware",
-        "post /v1/firmware/summary",
         "get /v1/robots",
         "post /v1/robots/drafts",
         "post /v1/robots/checks",

@@ -166,7 +166,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
         return await run(capacity, work)
 
     monkeypatch.setattr(ComputingCapacity, "run", arriving)
-    monkeypatch.setattr("gaitswarm.jobs.base.run_simulation", held)
+    monkeypatch.setattr("gaitswarm.operations.run_simulation", held)
     yield gate
     gate.opened.set()
 

@@ -219,11 +219,8 @@ def test_a_program_with_an_event_loop_makes_the_same_attempts(
     [
         lambda jobs: jobs.estimate(**SMALL),
         lambda jobs: jobs.ranking("k2q7zr5dm9xw", "B"),
-        lambda jobs: jobs.simulate({"P": 0.2}, controller="p", scenarios="1"),
-        lambda jobs: jobs.replay({"P": 0.2}, controller="p"),
-        lambda jobs: jobs.surface({"I": 0.1}),
     ],
-    ids=["estimate", "ranking", "simulate", "replay", "surface"],
+    ids=["estimate", "ranking"],
 )
 def test_whatever_only_reads_is_sent_again_although_it_has_a_body(
     read: Callable[[gaitswarm.Jobs], object],
@@ -269,7 +266,7 @@ def test_a_server_without_certificates_is_trusted_for_none() -> None:
 def test_another_kind_of_server_is_distinguished_from_gaitswarms(body: bytes) -> None:
     way = httpx2.MockTransport(lambda _: httpx2.Response(200, content=body))
     with gaitswarm.ServerJobs(URL, transport=way) as jobs:
-        for ask in (lambda: jobs.job("k2q7zr5dm9xw"), lambda: jobs.replay(PI, controller="pi")):
+        for ask in (lambda: jobs.job("k2q7zr5dm9xw"), lambda: jobs.evaluations("k2q7zr5dm9xw")):
             with pytest.raises(gaitswarm.StoreUnavailable, match="does not answer as a gaitswarm"):
                 ask()
 

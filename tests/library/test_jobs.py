@@ -9,7 +9,6 @@ import os
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import fields
 from pathlib import Path
 from typing import Any, cast
 
@@ -140,16 +139,6 @@ REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
     "a drive's certificate": (lambda jobs, job: jobs.certificate(job), "job_id"),
     "no world": (lambda jobs, job: jobs.certificate(job, worlds=0), "worlds"),
     "verify by no digest": (lambda jobs, job: jobs.verify(job, head="abc"), "head"),
-    "no design": (lambda jobs, _: jobs.simulate(cast(Any, 3)), "design"),
-    "half a design": (lambda jobs, _: jobs.simulate({"P": 0.4}, controller="pi"), "design"),
-    "gait out of reach": (
-        lambda jobs, _: jobs.simulate({**PUBLISHED, "stride": 0.9}),
-        "scenarios.0",
-    ),
-    "gain out of range": (lambda jobs, _: jobs.simulate({**PUBLISHED, "FI1R": -5.0}), "design"),
-    "too many frames": (lambda jobs, _: jobs.replay(PUBLISHED, rate=1e9), "rate"),
-    "too coarse a grid": (lambda jobs, _: jobs.surface(PUBLISHED, error_points=1), "error_points"),
-    "no fuzzy controller": (lambda jobs, _: jobs.surface(PI, controller="pi"), "controller"),
 }
 
 
@@ -180,7 +169,6 @@ MISSING: tuple[Callable[[gaitswarm.Jobs], Any], ...] = (
     lambda jobs: jobs.certificate("nosuchjob"),
     lambda jobs: list(jobs.export("nosuchjob")),
     lambda jobs: jobs.recording("0" * 32),
-    lambda jobs: jobs.surface(PUBLISHED, controller=cast(Any, "bang-bang")),
 )
 
 
@@ -431,48 +419,6 @@ def test_a_recorded_walk_is_kept_and_taken_back(reach: Reach, db: Path) -> None:
     assert (listed.id, listed.rows, listed.seconds) == (kept.id, 2, kept.seconds)
     assert list(jobs.recordings(search="slow")) == []
     assert jobs.record(walk).id == kept.id
-
-
-def test_a_design_walks_as_it_does_here(reach: Reach, db: Path) -> None:
-    result = reach(db).simulate(PI, controller="pi", scenarios=["1", "6"], preference="B")
-    here = gaitswarm.simulate(PI, controller="pi", scenarios=["1", "6"], preference="B")
-    assert result.scenarios == here.scenarios
-    assert result.preference == here.preference
-    assert result.table().to_arrow().equals(here.table().to_arrow())
-    assert result.fitness.tolist() == here.fitness.tolist()
-    assert result.logs == {}
-
-
-def test_a_log_comes_as_arrays(reach: Reach, db: Path) -> None:
-    short = gaitswarm.SCENARIOS[0].model_copy(update={"cycles": 1.0})
-    # On the second the robot falls, so that its log has no numbers after that.
-    for scenario in (short, short.model_copy(update={"slope": 45.0})):
-        asked: dict[str, Any] = {"controller": "pi", "scenarios": scenario, "log": True}
-        (log,) = reach(db).simulate(PI, **asked)["normal-fast"].logs
-        (here,) = gaitswarm.simulate(PI, **asked)["normal-fast"].logs
-        assert log is not None and here is not None
-        assert np.isnan(here.joint_angle).any() == (scenario is not short)
-        for column in fields(here):
-            there = getattr(log, column.name)
-            assert np.array_equal(there, getattr(here, column.name), equal_nan=True)
-
-
-def test_a_walk_is_replayed_frame_by_frame(reach: Reach, db: Path) -> None:
-    replay = reach(db).replay(PI, controller="pi", scenario="1", rate=10.0)
-    frames = replay.header.frames
-    assert frames == 45
-    assert replay.channels["time"][:3].ravel() == pytest.approx([0.0, 0.1, 0.2])
-    assert replay.channels["joint_angle"].shape == (frames, 18)
-    assert replay.channels["link_pose"].shape == (frames, len(replay.header.robot.links), 7)
-    (log,) = gaitswarm.simulate(PI, controller="pi", scenarios="1", log=True)["normal-fast"].logs
-    assert log is not None
-    assert replay.channels["joint_angle"][1] == pytest.approx(log.joint_angle[50], abs=1e-6)
-
-
-def test_surfaces_of_a_fuzzy_controller_are_computed(reach: Reach, db: Path) -> None:
-    surface = reach(db).surface(PUBLISHED, error_points=5, current_points=3)
-    (output,) = surface.outputs
-    assert np.shape(output.table) == (5, 3)
 
 
 def test_closing_twice_does_no_harm(reach: Reach, finished: Finished) -> None:

@@ -63,9 +63,6 @@ def test_a_job_in_single_is_read_alike_from_database_and_server(
     assert jobs.best(single.job.id) == single.best
     assert jobs.job(single.job.id).precision == "single"
     assert [job.precision for job in jobs.jobs()] == ["single"]
-    walked = jobs.simulate({"P": 0.45, "I": 0.1}, precision="single", **WALK)
-    here = gaitswarm.simulate({"P": 0.45, "I": 0.1}, precision="single", **WALK)
-    assert (walked.precision, walked.fitness.tolist()) == ("single", here.fitness.tolist())
 
 
 def test_a_search_in_double_says_nothing_of_another_precision(finished: Finished) -> None:

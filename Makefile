@@ -43,8 +43,8 @@ wheel: setup page-if-possible manual ## Build a wheel into dist/, with the page,
 research: setup-dev ## Compare search methods in a small experiment (a minute or two).
 	@$(BIN)/gaitswarm-research compare small $(ARGS)
 
-bench: setup ## Measure the simulator on one core of this machine.
-	@$(BIN)/gaitswarm bench $(ARGS)
+bench: setup-dev ## Measure the simulator on one core of this machine.
+	@$(BIN)/python -m benchmarks.simulator $(ARGS)
 
 # Tests start hundreds of processes; compiling every module again would take a third of their time.
 test test-all test-research unit: export PYTHONDONTWRITEBYTECODE =

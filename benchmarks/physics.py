@@ -17,8 +17,8 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.simulator import measure
 from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
-from gaitswarm.sim.benchmark import measure
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.reference import Stepper

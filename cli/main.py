@@ -77,7 +77,7 @@ _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
         *(analysis.failures, analysis.preferences, "plot"),
         *(evidence.export, evidence.evidence, evidence.verify),
     ),
-    "Designs": (designs.compare, certify.certify, designs.robustness, designs.firmware),
+    "Designs": (certify.certify, designs.robustness, designs.firmware),
     "Robots and measurements": (
         *(robot.gaits, robot.mjcf, measurements.record, measurements.recordings),
         *(measurements.identify, measurements.parameters, measurements.calibrate),
@@ -85,7 +85,7 @@ _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
     ),
     "Installation": (
         *(administration.optimizers, administration.cases, administration.plugins, "token"),
-        *(administration.audit, "db", administration.bench),
+        *(administration.audit, "db"),
     ),
 }
 """Commands and groups in the order of the help text, by heading."""

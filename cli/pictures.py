@@ -31,7 +31,6 @@ if TYPE_CHECKING:
         ParameterView,
     )
     from gaitswarm.sim.controllers.surface import Surface
-    from gaitswarm.sim.drives import WalkFigures
     from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised
     from gaitswarm.sim.validation import Comparison
 
@@ -107,25 +106,6 @@ def draw_surface(surface: Surface, *, title: str) -> Figure:
     figure.suptitle(title, x=0.04, ha="left", weight="bold")
     unit = surface.output.universe.unit
     figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.06, label=f"output  [{unit}]")
-    return figure
-
-
-def draw_comparison(figures: Sequence[WalkFigures]) -> Figure:
-    """Draw speed, power and effectivity of every drive, grouped by scenario."""
-    scenarios = list(dict.fromkeys(f.scenario for f in figures))
-    drives = list(dict.fromkeys(f.drive for f in figures))
-    by_walk = {(f.scenario, f.drive): f for f in figures}
-    figure = _figure(8.0, 7.0)
-    panels = figure.subplots(3, 1, sharex=True)
-    quantities = (("speed", "m/s"), ("power", "W"), ("effectivity", "m/J"))
-    for axes, (name, unit) in zip(panels, quantities, strict=True):
-        heights = {
-            drive: _floats([getattr(by_walk[scenario, drive], name) for scenario in scenarios])
-            for drive in drives
-        }
-        _draw_bars(axes, scenarios, heights)
-        axes.set_ylabel(f"{name}  [{unit}]")
-    panels[0].legend(ncols=len(drives), loc="lower left", bbox_to_anchor=(0, 1))
     return figure
 
 

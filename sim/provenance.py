@@ -25,8 +25,6 @@ _ROOT: Final = Path(__file__).parent
 _SUFFIXES: Final = (".py", ".c", ".h")
 
 _NOT_IN_A_CASE: Final = (
-    "benchmark.py",
-    "drives.py",
     "measurement",
     "proposal",
     "provenance.py",

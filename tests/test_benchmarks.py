@@ -10,6 +10,9 @@ from typing import Any
 
 import pytest
 
+from gaitswarm.sim.assembly import PHYSICS_RATE
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.simulate import lanes, prepare
 from tests.examples.processes import python
 from tests.robots.known import QUADRUPEDS, urdf_of
 
@@ -41,6 +44,19 @@ def test_the_physics_benchmark_tells_ratios(report: Report) -> None:
         assert row["times_the_kernel"] == pytest.approx(ratio)
         # A step is 0.4 ms of the robot's time.
         assert row["real_time_factor"] == pytest.approx(400.0 / row["us_per_step"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_the_simulator_benchmark_tells_speed_lanes_and_backend(
+    report: Report, precision: Precision
+) -> None:
+    measured = report("simulator", "--repeats", "1", "--precision", precision)
+    assert (measured["backend"], measured["lanes"]) == (prepare(), lanes(precision))
+    assert measured["precision"] == precision
+    assert 0.9 < measured["lane_use"] <= 1.0
+    step = measured["us_per_step_per_walker"]
+    assert measured["real_time_factor_per_core"] == pytest.approx(1e6 / (step * PHYSICS_RATE))
 
 
 @pytest.mark.slow

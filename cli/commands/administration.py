@@ -1,4 +1,4 @@
-"""Administration of an installation: databases, tokens, audit log, plug-ins, benchmark."""
+"""Administration of an installation: databases, tokens, audit log, plug-ins."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from gaitswarm.cli.exit_codes import CheckFailed
-from gaitswarm.cli.options import Db, Json, Precision, completed, one_of
+from gaitswarm.cli.options import Db, Json, completed
 from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -302,33 +302,3 @@ def _described(view: OptimizerView | CaseView) -> str:
 
 def _settings(settings: dict[str, Any]) -> str:
     return "\n".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
-
-
-def bench(
-    repeats: Annotated[
-        int, typer.Option(min=1, max=1000, help="Passes; the fastest one counts.")
-    ] = 3,
-    backend: Annotated[
-        str, typer.Option(help="auto, native (compiled) or reference (interpreted).")
-    ] = "auto",
-    precision: Precision = None,
-) -> Printed:
-    """Measure the simulator's speed on one core, for the main Fuzzy-PI job."""
-    from typing import get_args
-
-    from gaitswarm.sim import benchmark
-    from gaitswarm.sim.assembly import Backend
-    from gaitswarm.sim.kernel import walk
-
-    digits: walk.Precision = one_of(get_args(walk.Precision), precision or "double", "precision")
-    requested: Backend = one_of(get_args(Backend), backend, "backend")
-    result = benchmark.measure(repeats=repeats, backend=requested, precision=digits)
-    size = (
-        "" if result.bytes_of_code is None else f", {result.bytes_of_code / 1024:.0f} KiB of code"
-    )
-    return result, (
-        f"{result.backend} kernel in {result.precision} precision, {result.lanes} walkers in"
-        f" lock-step{size}: {result.us_per_step_per_walker:.3f} us per physics step and walker,"
-        f" {result.real_time_factor_per_core:.0f} x real time on one core,"
-        f" {result.lane_use:.1%} of its lanes used"
-    )

@@ -13,6 +13,7 @@ from gaitswarm_research.compare.command import compare
 from gaitswarm_research.reconstruction.command import reconstruction
 from gaitswarm_research.studies.accuracy import noise, steps, tables
 from gaitswarm_research.studies.controllers import controllers
+from gaitswarm_research.studies.drives import drives
 from gaitswarm_research.studies.precision import precision
 from gaitswarm_research.studies.worlds import worlds
 
@@ -33,9 +34,9 @@ app.command()(compare)
 app.command()(reconstruction)
 study = typer.Typer(
     no_args_is_help=True,
-    help="Measure the effect of tables, time steps, noise, precision, controllers and worlds.",
+    help="Measure effects of tables, time steps, noise, precision, controllers, worlds and drives.",
 )
-for command in (tables, steps, noise, precision, controllers, worlds):
+for command in (tables, steps, noise, precision, controllers, worlds, drives):
     study.command()(command)
 app.add_typer(study, name="study")
 

@@ -5,17 +5,10 @@ Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.scenario import Scenario
-
 Floats = NDArray[np.float64]
-
-UPDATES_PER_CYCLE: Final = 42
-"""New targets per cycle: 20 points of support, 20 of swing, and the two ends of the stride."""
 
 
 def quadratic_spline(
@@ -32,17 +25,3 @@ def quadratic_spline(
     forward = np.where(supporting, 0.5 - support, 0.5 * (front - rear)) * stride
     lift = np.where(supporting, 0.0, 2.0 * a * (1.0 - a) * 2.0 * height)
     return forward, lift
-
-
-def driven_as_in_2011(scenario: Scenario) -> Scenario:
-    """Return a scenario with the trajectory of 2011 and its own cycle time (appendix .2.1)."""
-    fields = {
-        "curve": "quadratic_spline",
-        "duty_factor": 0.5,
-        "duty_phase": "support",
-        "trajectory_rate": UPDATES_PER_CYCLE / scenario.cycle_time,
-        "fir_ms": 0,
-        "start_phase": 0.5,
-        "turn_mode": "both",
-    }
-    return Scenario.model_validate(scenario.model_dump() | fields)

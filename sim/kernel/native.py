@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
-import struct
 import threading
 import time
 from collections.abc import Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -254,11 +252,6 @@ class NativeKernel:
                     f" {compiled}, not {size}; remove kernel-* from the kernel cache directory"
                 )
 
-    @property
-    def code_size(self) -> int | None:
-        """Machine code of the library [B]; None if it is not an ELF file."""
-        return text_size(Path(self._library._name).read_bytes())  # noqa: SLF001 - documented
-
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute all walks, `lanes` at a time, in the order of `plan_lanes`.
 
@@ -319,19 +312,6 @@ class NativeKernel:
 @lru_cache(maxsize=64)
 def _order(ticks: tuple[int, ...], lanes: int) -> tuple[int, ...]:
     return plan_lanes(ticks, lanes).order
-
-
-def text_size(library: bytes) -> int | None:
-    """Size of the section `.text` of a 64-bit little-endian ELF file [B]; None for others."""
-    if library[:6] != b"\x7fELF\x02\x01":
-        return None
-    (table,) = struct.unpack_from("<Q", library, 0x28)
-    size, count, names = struct.unpack_from("<HHH", library, 0x3A)
-    headers = [struct.unpack_from("<IIQQQQ", library, table + size * k) for k in range(count)]
-    for name, _, _, _, _, length in headers:
-        if library.startswith(b".text\0", headers[names][4] + name):
-            return int(length)
-    return None
 
 
 _libraries: Final[dict[bytes, ctypes.CDLL | None]] = {}

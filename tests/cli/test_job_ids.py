@@ -39,7 +39,6 @@ COMMANDS = {
     "best": "ID --json",
     "cancel": "ID",
     "certify": "ID --worlds 1 --scenarios 7 --evaluator in-process",
-    "compare": "job:ID --scenario 3 --json",
     "delete": "ID --yes",
     "diff": "ID --json",
     "evidence": "ID --output FILE.zip",
@@ -87,8 +86,8 @@ OTHERWISE = {
 
 
 def test_all_commands_that_take_an_id_are_among_them() -> None:
-    # A drive of `compare` is a name as well; the id of a recording is given in full.
-    assert command_line.taking(r"\bID\b") | {"compare"} == COMMANDS.keys()
+    # The id of a recording is given in full.
+    assert command_line.taking(r"\bID\b") == COMMANDS.keys()
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,6 @@ COMMANDS = [
     "rank ID --preference A",
     "preferences ID --for 0.0",
     "diff JOBS",
-    "compare 2016 pi fuzzy-pi-3 --scenario 1,3",
     "simulate --design published:A --scenario 1",
     "gaits",
     "optimizers",
@@ -69,19 +68,3 @@ def test_narrow_terminals_show_the_same_words_as_wide_ones(
         out = said(columns)
         assert whole - set(out.split()) == set(), out
         assert "…" not in out
-
-
-def test_drives_are_compared_below_the_names_of_their_scenarios(
-    gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "60")
-    result = gaitswarm("compare", "2016", "pi", "--scenario", "1,3")
-    blocks = [block.split() for block in result.out.split("\n\n")]
-    assert [block[:3] for block in blocks] == [
-        ["normal-fast"],
-        ["scenario", "drive", "2016"],
-        ["scenario", "drive", "pi"],
-        ["loaded-fast"],
-        ["scenario", "drive", "2016"],
-        ["scenario", "drive", "pi"],
-    ]

@@ -10,11 +10,6 @@ from typer import Context
 
 from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.cli.main import commands
-from gaitswarm.sim.assembly import PHYSICS_RATE
-from gaitswarm.sim.kernel.native import native_kernel
-from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
-from gaitswarm.sim.simulate import lanes, prepare
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.processes import COMMAND_LINE, loaded_by, output, start_python
 
@@ -106,26 +101,3 @@ def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -
         output(process.stdout).close()
         assert output(process.stderr).read() == ""
         assert process.wait(timeout=60) == ExitCode.OK
-
-
-@pytest.mark.variants("single")
-@pytest.mark.slow
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_bench_reports_speed_lanes_and_backend(gaitswarm: Gaitswarm, precision: Precision) -> None:
-    result = gaitswarm("bench", "--repeats", "1", "--precision", precision, "--json")
-    assert result.code == 0, result.err
-    measured = result.json
-    assert (measured["backend"], measured["lanes"]) == (prepare(), lanes(precision))
-    assert measured["precision"] == precision
-    assert 0.9 < measured["lane_use"] <= 1.0
-    kernel = native_kernel(load_robot(DEFAULT_ROBOT), precision)
-    assert kernel is not None and measured["bytes_of_code"] == kernel.code_size
-    step = measured["us_per_step_per_walker"]
-    assert measured["real_time_factor_per_core"] == pytest.approx(1e6 / (step * PHYSICS_RATE))
-
-
-@pytest.mark.parametrize("option", ["--backend", "--precision"])
-def test_bench_names_unknown_values(gaitswarm: Gaitswarm, option: str) -> None:
-    result = gaitswarm("bench", option, "abacus")
-    assert result.code == 2
-    assert option.removeprefix("--") in result.err

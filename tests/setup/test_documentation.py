@@ -41,7 +41,7 @@ def test_every_command_of_a_block_is_taken_by_the_command_line(
 @pytest.mark.parametrize(
     "wrong",
     ["best", "best ID ID", "list --limit x", "study other", "token create ci --scope all",
-     "optimize --iterations", "prioritize ID --priority 11", "plot surfaces", "bench --quick"],
+     "optimize --iterations", "prioritize ID --priority 11", "plot surfaces", "optimizers --quick"],
 )  # fmt: skip
 def test_a_command_that_the_command_line_does_not_take_is_seen(wrong: str) -> None:
     known = wrong.replace("ID", "k2q7zr5dm9xw").split()

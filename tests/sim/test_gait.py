@@ -15,7 +15,7 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import UnreachablePose
 from gaitswarm.sim.gait.half_ellipse import half_ellipse
 from gaitswarm.sim.gait.inverse_kinematics import leg_angles
-from gaitswarm.sim.gait.quadratic_spline import driven_as_in_2011, quadratic_spline
+from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
 from gaitswarm.sim.gait.trajectory import desired_angles, n_ticks, require_reachable
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.robot.posture import feet_below_body, resting_height
@@ -272,8 +272,20 @@ def test_trajectories_differ_in_everything_they_depend_on(
 
 def scenario_2011(w_s: float, turn: float = 0.0) -> Scenario:
     """A level walk by the commands of 2011 (appendix .2.1); w_s sets the cycle's length."""
-    walk = Scenario(name="2011", cycle_time=25.2 / w_s, radius=0.16, hip_height=0.15, turn=turn)
-    return driven_as_in_2011(walk)
+    cycle_time = 25.2 / w_s
+    return Scenario(
+        name="2011",
+        cycle_time=cycle_time,
+        radius=0.16,
+        hip_height=0.15,
+        turn=turn,
+        turn_mode="both",
+        curve="quadratic_spline",
+        duty_factor=0.5,
+        trajectory_rate=42 / cycle_time,
+        fir_ms=0,
+        start_phase=0.5,
+    )
 
 
 @pytest.mark.parametrize(
@@ -311,13 +323,6 @@ def test_in_2011_a_turn_shortened_one_sides_stride_and_lengthened_the_others() -
     scenario = scenario_2011(10, 0.25)
     assert scenario.stride_of(-1) == 0.75 * scenario.stride
     assert scenario.stride_of(1) == 1.25 * scenario.stride
-
-
-def test_any_scenario_may_be_driven_as_in_2011_in_its_own_cycle() -> None:
-    slow = driven_as_in_2011(SCENARIOS[3])
-    assert (slow.cycle_time, slow.trajectory_rate) == (2.2, 42 / 2.2)
-    kept = ("name", "radius", "hip_height", "load", "stride", "height", "cycles")
-    assert [getattr(slow, name) for name in kept] == [getattr(SCENARIOS[3], name) for name in kept]
 
 
 def test_at_rest_the_springs_carry_the_weight(robot: Robot) -> None:

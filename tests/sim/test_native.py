@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -12,19 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
 from gaitswarm.sim.compiler.compilation import (
     COMPILER_MEMORY,
-    build_library,
     load_library,
     vector_header,
 )
+from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
-from gaitswarm.sim.kernel.native import NativeKernel, native_kernel, text_size
+from gaitswarm.sim.kernel.native import NativeKernel, native_kernel
 from gaitswarm.sim.kernel.parameters import Layout
+from gaitswarm.sim.kernel.walk import Coding
 from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import prepare
 from tests.examples.paths import copy_package
+from tests.examples.walks import PUBLISHED_A
 from tests.sim.processes import ROOT, run_python
 
 pytestmark = pytest.mark.slow
@@ -76,8 +79,12 @@ def test_a_process_with_a_warm_cache_needs_neither_casadi_nor_pinocchio() -> Non
     assert native_kernel(load_robot(DEFAULT_ROBOT)) is not None
     done = run_python(
         "import sys\n"
-        "from gaitswarm.sim.benchmark import measure\n"
-        "measure(repeats=1, walkers=1)\n"
+        "import numpy as np\n"
+        "from gaitswarm.sim.controllers import CONTROLLERS\n"
+        "from gaitswarm.sim.scenario import SCENARIOS\n"
+        "from gaitswarm.sim.simulate import simulate\n"
+        "design = CONTROLLERS['fuzzy-pi'].published['A']\n"
+        "simulate(SCENARIOS[0], 'fuzzy-pi', list(design), np.array([list(design.values())]))\n"
         "print(sorted({'casadi', 'pinocchio', 'ray', 'sqlalchemy', 'fastapi'} & set(sys.modules)))"
     )
     assert done.stdout.strip() == "[]", done.stderr
@@ -202,6 +209,7 @@ print(native_kernel(load_robot(RobotFiles(toml=toml, urdf=urdf))).backend)
 COMPILE_ANOTHER = """
 import os, threading
 from pathlib import Path
+from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
 from gaitswarm.sim.kernel.native import native_kernel
@@ -352,17 +360,9 @@ def test_a_library_whose_structures_differ_is_refused_with_its_name(robot: Robot
             made_of(right | {name: 7})
 
 
-def test_the_size_of_code_is_that_of_the_text_section(robot: Robot) -> None:
-    readelf = shutil.which("readelf")
-    if readelf is None:
-        pytest.skip("there is no readelf")
-    source = "int twice(int x) { return 2 * x; }"
-    library = build_library("size", source.encode(), lambda: source)
-    assert library is not None
-    listed = subprocess.run([readelf, "-SW", library], capture_output=True, text=True, check=True)
-    [text] = [line for line in listed.stdout.splitlines() if " .text " in line]
-    size = text_size(library.read_bytes())
-    assert size == int(text.split("PROGBITS")[1].split()[2], 16)
-    assert text_size(b"MZ, not of this format") is None
+def test_an_inference_is_refused_by_the_compiled_kernel(robot: Robot) -> None:
     kernel = native_kernel(robot)
-    assert kernel is not None and kernel.code_size is not None and kernel.code_size > size
+    plan = plan_walk(robot, SCENARIOS[0], 1.0 / PHYSICS_RATE)
+    assert kernel is not None and plan is not None
+    with pytest.raises(SimulationInputError, match="runs tables only"):
+        kernel.walk([plan(FuzzyPi().without_table(PUBLISHED_A))], Coding.of(robot, 10), log=False)

@@ -1,10 +1,15 @@
-"""Benchmark of this machine: one core, the physics of the main Fuzzy-PI job."""
+"""Speed of the simulator on one core, for the main Fuzzy-PI job.
+
+python -m benchmarks.simulator [--repeats 3] [--precision double] [--json]
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -27,8 +32,6 @@ class BenchmarkResult:
     lane_use: float  # share of the lanes' time spent walking [1]
     backend: str  # `native` or `reference`
     precision: Precision
-    # machine code of the kernel [B]; None if it cannot be measured
-    bytes_of_code: int | None
     walkers: int  # per scenario
     simulated_seconds: float  # of all walks [s]
     elapsed_seconds: float  # wall time of the pass [s]
@@ -64,7 +67,6 @@ def measure(
         lane_use=spent.lane_use.share,
         backend=kernel.backend,
         precision=precision,
-        bytes_of_code=kernel.code_size if isinstance(kernel, NativeKernel) else None,
         walkers=count,
         simulated_seconds=simulated,
         elapsed_seconds=elapsed,
@@ -100,3 +102,26 @@ def _walk(
         spent,
     )
     return time.perf_counter() - start, spent
+
+
+def main() -> None:
+    """Print the fastest pass."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=3, help="passes; the fastest one counts")
+    parser.add_argument("--precision", choices=("double", "single"), default="double")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    result = measure(repeats=options.repeats, precision=options.precision)
+    if options.json:
+        print(json.dumps(asdict(result), indent=2))
+        return
+    print(
+        f"{result.backend} kernel in {result.precision} precision, {result.lanes} walkers in"
+        f" lock-step: {result.us_per_step_per_walker:.3f} us per physics step and walker,"
+        f" {result.real_time_factor_per_core:.0f} x real time on one core,"
+        f" {result.lane_use:.1%} of its lanes used"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Final, NamedTuple, TypedDict, TypeVar, Unpack
+from typing import Annotated, Final, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
 from gaitswarm.simulation import evaluated
@@ -141,52 +141,39 @@ ByObjective = Annotated[dict[str, Finite], Field(examples=[{"torque": 0.2}])]
 
 
 class SampledVariableView(View):
-    """A sampled variable and its normalisation."""
+    """A sampled variable, in its unit."""
 
     name: str = Field(description="Name of the variable.", examples=["FI1R"])
-    unit: str = Field(description="Its unit.", examples=["counts"])
-    low: float = Field(description="Lower bound by which it is normalised.", examples=[1500.0])
-    high: float = Field(description="Upper bound by which it is normalised.", examples=[6000.0])
-    value: float = Field(description="Of the design.", examples=[5837.0])
     least: float = Field(description="Least value of the sample.", examples=[5613.2])
     most: float = Field(description="Greatest value of the sample.", examples=[5999.1])
 
 
-class ScenarioRobustnessView(View):
-    """Effect of small changes of the variables in one scenario.
+class SensitivityView(View):
+    """Relative changes of objectives over the variables' whole bounds.
 
-    Numbers are relative changes of an objective over a variable's whole bounds; null if too few of
-    the sample's simulations completed.
+    Numbers are null if too few of the sample's simulations completed.
     """
 
-    index: IndexView | None = Field(description="Frobenius norm of the Jacobian.")
-    spectral_norm: Finite = Field(
-        description="Largest singular value of the Jacobian: the greatest relative change of all"
-        " objectives together, by one step of length one [1].",
-        examples=[1.1],
+    index: IndexView | None = Field(
+        description="Frobenius norm of the Jacobian; over all scenarios the root mean square."
     )
     by_objective: ByObjective = Field(description="Norms of the Jacobian's rows [1].")
     by_variable: ByVariable = Field(description="Norms of the Jacobian's columns [1].")
+
+
+class ScenarioRobustnessView(SensitivityView):
+    """Effect of small changes of the variables in one scenario."""
+
     jacobian: dict[str, ByVariable] = Field(
         description="Of the objectives' logarithms, by objective and variable [1]."
-    )
-    standard_error: dict[str, ByVariable] = Field(description="Of the Jacobian's entries [1].")
-    unexplained: ByObjective = Field(
-        description="Standard deviation of the relative changes that the Jacobian does not explain"
-        " [1]: curvature and roughness."
     )
     walked: int = Field(description="Simulations with all objectives.", examples=[257])
     failed: int = Field(description="Simulations without.", examples=[0])
 
 
-class Sensitivities(View):
+class Sensitivities(SensitivityView):
     """Sensitivities of a design in several scenarios."""
 
-    index: IndexView | None = Field(
-        description="Root mean square of the scenarios' indices; null if a scenario has none."
-    )
-    by_objective: ByObjective = Field(description="Root mean square over the scenarios [1].")
-    by_variable: ByVariable = Field(description="Root mean square over the scenarios [1].")
     scenarios: dict[str, ScenarioRobustnessView] = Field(description="By the scenario's name.")
 
 
@@ -253,46 +240,10 @@ def run_robustness(
 ) -> RobustnessView:
     """Simulate a design and a sample around it, and estimate its robustness."""
     request.check_walks()
-    sample = request.sample()
-    outcomes = _walked(request, sample, cpus, progress)
-    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
-    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
-    scenarios = [scenario.name for scenario in request.resolved_scenarios()]
-    center = dict(zip(sample.names, sample.designs[0].tolist(), strict=True))
-    return RobustnessView(
-        **dict(sensitivities(sample, objectives, failed, scenarios)),
-        robot=request.robot,
-        controller=request.controller,
-        design=design_shown(request.controller, center),
-        precision=request.precision,
-        samples=len(sample.designs) - 1,
-        radius=sample.radius,
-        seed=request.seed,
-        variables=[
-            SampledVariableView(
-                name=variable.name,
-                unit=variable.unit,
-                low=variable.low,
-                high=variable.high,
-                value=values[0],
-                least=values.min(),
-                most=values.max(),
-            )
-            for variable in sample.varied
-            for values in (sample.designs[:, sample.names.index(variable.name)],)
-        ],
-        held=list(sample.held),
-        objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
-    )
-
-
-def _walked(
-    request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
-) -> tuple[Outcome, ...]:
-    """Simulate the sample; one outcome per scenario."""
+    sample, scenarios = request.sample(), request.resolved_scenarios()
     cases = [
         Walk(request.robot, request.controller, scenario, sample.names, request.precision)
-        for scenario in request.resolved_scenarios()
+        for scenario in scenarios
     ]
     done, planned = 0, len(sample.designs) * len(cases)
 
@@ -302,13 +253,29 @@ def _walked(
         if progress is not None:
             progress(done, planned)
 
-    return evaluated(
-        cases,
-        sample.designs,
-        [request.robot],
-        request.precision,
-        cpus=cpus,
-        on_task=report,
+    outcomes = evaluated(
+        cases, sample.designs, [request.robot], request.precision, cpus=cpus, on_task=report
+    )
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+    names = [scenario.name for scenario in scenarios]
+    center = dict(zip(sample.names, sample.designs[0].tolist(), strict=True))
+    return RobustnessView(
+        **dict(sensitivities(sample, objectives, failed, names)),
+        robot=request.robot,
+        controller=request.controller,
+        design=design_shown(request.controller, center),
+        precision=request.precision,
+        samples=len(sample.designs) - 1,
+        radius=sample.radius,
+        seed=request.seed,
+        variables=[
+            SampledVariableView(name=variable.name, least=values.min(), most=values.max())
+            for variable in sample.varied
+            for values in (sample.designs[:, sample.names.index(variable.name)],)
+        ],
+        held=list(sample.held),
+        objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
     )
 
 
@@ -415,22 +382,6 @@ def _around(center: float, variable: Variable, radius: float, numbers: Floats) -
     return np.asarray(low + numbers * (high - low))
 
 
-class _Norm(NamedTuple):
-    """Squared norm of a Jacobian."""
-
-    biased: float  # of the sample's regression
-    unbiased: Floats  # (1 + B,) less the contribution of noise, of the sample and of each resample
-
-    def interval(self) -> IndexView:
-        """Interval of the norm. For a resample the sample's biased norm is the true one."""
-        estimate, *resampled = np.sqrt(np.maximum(self.unbiased, 0.0)).tolist()
-        errors = np.array(resampled) - math.sqrt(self.biased)
-        tail = (1.0 - CONFIDENCE) / 2.0
-        least, most = np.quantile(errors, [tail, 1.0 - tail]).tolist()
-        low, high = max(0.0, estimate - most), max(0.0, estimate - least)
-        return IndexView(value=estimate, low=min(low, estimate), high=max(high, estimate))
-
-
 def sensitivities(
     sample: LocalSample,
     objectives: Floats,
@@ -448,67 +399,66 @@ def sensitivities(
     weights = _resamples(len(sample.designs))
     variables = [variable.name for variable in sample.varied]
     views: dict[str, ScenarioRobustnessView] = {}
-    norms: list[_Norm] = []
-    rows, columns = [], []
+    biased, unbiased, rows, columns = [], [], [], []
     for k, name in enumerate(scenarios):
-        walked = int(usable[:, k].sum())
-        none = np.full((values.shape[2], len(variables)), np.nan)
-        jacobian, error, spectral, unexplained = none, none, math.nan, none[:, 0]
-        by_objective, by_variable, norm = none[:, 0], none[0], None
-        if walked >= least_samples(len(variables)):
-            shift = sample.shift[usable[:, k]] / sample.radius
-            logarithms = np.log(values[usable[:, k], k])
-            fits = _regressions(
-                np.hstack([np.ones((walked, 1)), shift]),
+        chosen = usable[:, k]
+        slopes = squares = np.full((len(weights), len(variables), values.shape[2]), np.nan)
+        if chosen.sum() >= least_samples(len(variables)):
+            shift = sample.shift[chosen] / sample.radius
+            logarithms = np.log(values[chosen, k])
+            slopes, variances = _regressions(
+                np.hstack([np.ones((len(shift), 1)), shift]),
                 logarithms - logarithms.mean(axis=0),
-                weights[:, usable[:, k]],
+                weights[:, chosen],
             )
-            slopes = fits.slopes / sample.radius
-            variances = fits.variances / sample.radius**2
-            squares = slopes**2 - variances
-            norm = _Norm(float((slopes[0] ** 2).sum()), squares.sum(axis=(1, 2)))
-            norms.append(norm)
-            jacobian, error = slopes[0].T, np.sqrt(variances[0]).T
-            spectral, unexplained = float(np.linalg.norm(slopes[0], 2)), fits.residual[0]
-            by_objective = np.sqrt(np.maximum(squares[0].sum(axis=0), 0.0))
-            by_variable = np.sqrt(np.maximum(squares[0].sum(axis=1), 0.0))
-        rows.append(by_objective)
-        columns.append(by_variable)
+            slopes = slopes / sample.radius
+            squares = slopes**2 - variances / sample.radius**2
+        biased.append(float((slopes[0] ** 2).sum()))
+        unbiased.append(squares.sum(axis=(1, 2)))
+        rows.append(np.sqrt(np.maximum(squares[0].sum(axis=0), 0.0)))
+        columns.append(np.sqrt(np.maximum(squares[0].sum(axis=1), 0.0)))
+        jacobian = [_named(variables, row) for row in slopes[0].T]
         views[name] = ScenarioRobustnessView(
-            index=None if norm is None else norm.interval(),
-            spectral_norm=spectral,
-            by_objective=_named(NORMALISED_NAMES, by_objective),
-            by_variable=_named(variables, by_variable),
-            jacobian=_named(NORMALISED_NAMES, [_named(variables, row) for row in jacobian]),
-            standard_error=_named(NORMALISED_NAMES, [_named(variables, row) for row in error]),
-            unexplained=_named(NORMALISED_NAMES, unexplained),
-            walked=walked,
-            failed=len(usable) - walked,
+            index=_interval(biased[-1], unbiased[-1]),
+            by_objective=_named(NORMALISED_NAMES, rows[-1]),
+            by_variable=_named(variables, columns[-1]),
+            jacobian=_named(NORMALISED_NAMES, jacobian),
+            walked=int(chosen.sum()),
+            failed=int((~chosen).sum()),
         )
-    mean = None
-    if len(norms) == len(views):
-        unbiased = np.mean([norm.unbiased for norm in norms], axis=0)
-        mean = _Norm(float(np.mean([norm.biased for norm in norms])), unbiased)
     return Sensitivities(
-        index=None if mean is None else mean.interval(),
+        index=_interval(float(np.mean(biased)), np.mean(unbiased, axis=0)),
         by_objective=_named(NORMALISED_NAMES, np.sqrt(np.mean(np.square(rows), axis=0))),
         by_variable=_named(variables, np.sqrt(np.mean(np.square(columns), axis=0))),
         scenarios=views,
     )
 
 
+def _interval(biased: float, unbiased: Floats) -> IndexView | None:
+    """Interval of a Jacobian's norm; None for NaN.
+
+    biased: squared norm of the sample's regression, the true one for its resamples.
+    unbiased: (1 + B,) less the contribution of noise, of the sample and of each resample.
+    """
+    if math.isnan(biased):
+        return None
+    estimate, *resampled = np.sqrt(np.maximum(unbiased, 0.0)).tolist()
+    errors = np.array(resampled) - math.sqrt(biased)
+    tail = (1.0 - CONFIDENCE) / 2.0
+    least, most = np.quantile(errors, [tail, 1.0 - tail]).tolist()
+    low, high = max(0.0, estimate - most), max(0.0, estimate - least)
+    return IndexView(value=estimate, low=min(low, estimate), high=max(high, estimate))
+
+
 def _named(names: Iterable[str], values: Iterable[T]) -> dict[str, T]:
     return dict(zip(names, values, strict=True))
 
 
-class _Regressions(NamedTuple):
-    slopes: Floats  # (1 + B, d, M)
-    variances: Floats  # of the slopes, (1 + B, d, M)
-    residual: Floats  # standard deviation, (1 + B, M)
+def _regressions(x: Floats, y: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Slopes (1 + B, d, M) by least squares with each row of weights, and their variances.
 
-
-def _regressions(x: Floats, y: Floats, weights: Floats) -> _Regressions:
-    """Least squares by each row of weights: x (n, 1 + d) with a column of ones, y (n, M)."""
+    x: (n, 1 + d) with a column of ones; y: (n, M).
+    """
     n, p = x.shape
     gram = (weights @ (x[:, :, None] * x[:, None, :]).reshape(n, -1)).reshape(-1, p, p)
     moments = (weights @ (x[:, :, None] * y[:, None, :]).reshape(n, -1)).reshape(len(gram), p, -1)
@@ -519,11 +469,7 @@ def _regressions(x: Floats, y: Floats, weights: Floats) -> _Regressions:
     freedom = np.maximum(weights.sum(axis=1) - p, 1.0)
     residual_variance = np.maximum(squares, 0.0) / freedom[:, None]
     diagonal = np.diagonal(inverse, axis1=1, axis2=2)[:, 1:]
-    return _Regressions(
-        slopes=coefficients[:, 1:],
-        variances=diagonal[:, :, None] * residual_variance[:, None, :],
-        residual=np.sqrt(residual_variance),
-    )
+    return coefficients[:, 1:], diagonal[:, :, None] * residual_variance[:, None, :]
 
 
 def _resamples(n: int) -> Floats:

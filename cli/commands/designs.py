@@ -262,12 +262,6 @@ def _robustness(view: RobustnessView) -> Parts:
         f"{view.samples} designs within {100.0 * view.radius:g} % of each variable's bounds;"
         " values are relative changes of objectives over the whole bounds; smaller is more robust"
     )
-    largest = {
-        o.name: max(part.unexplained[o.name] or 0.0 for part in view.scenarios.values())
-        for o in view.objectives
-    }
-    shares = (f"{SHORT[name]} {number(100.0 * value, 2)} %" for name, value in largest.items())
-    yield f"unexplained by the linear model, largest of all scenarios: {', '.join(shares)}"
     if view.held:
         yield f"fixed: {', '.join(view.held)}"
 

@@ -58,7 +58,6 @@ def test_the_jacobian_of_an_exponential_is_found_exactly() -> None:
     assert part.index is not None and found.index is not None
     assert part.index.value == pytest.approx(np.linalg.norm(SLOPES))
     assert found.index.value == pytest.approx(part.index.value)
-    assert part.spectral_norm == pytest.approx(np.linalg.norm(SLOPES, 2))
     np.testing.assert_allclose(values(part.by_objective), np.linalg.norm(SLOPES, axis=1), atol=1e-9)
     np.testing.assert_allclose(values(part.by_variable), np.linalg.norm(SLOPES, axis=0), atol=1e-9)
     assert (part.walked, part.failed) == (129, 0)
@@ -92,7 +91,6 @@ def test_noise_alone_is_no_sensitivity() -> None:
     assert found.index.low == 0.0
     # Without what noise adds taken off it would be some 0.13.
     assert found.index.value < 0.1
-    np.testing.assert_allclose(values(found.scenarios["0"].unexplained), 0.02, rtol=0.2)
 
 
 def test_over_several_scenarios_the_index_is_their_root_mean_square() -> None:

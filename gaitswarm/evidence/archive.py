@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib import resources
@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json, to_json
 
 from gaitswarm.evidence import FORMAT, MANIFEST, VERSION
-from gaitswarm.evidence.page import CertificateOnPage, page, pictures
+from gaitswarm.evidence.page import CertificateOnPage, page
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
 from gaitswarm.services.optimizer.errors import Conflict
@@ -36,16 +36,11 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
-from gaitswarm.services.optimizer.jobs.provenance import (
-    JobProvenance,
-    ProvenanceRecord,
-    job_provenance,
-)
+from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification import RecordedWalk, Recordings
 from gaitswarm.sim.input import message_of
-from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 from gaitswarm.sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 from gaitswarm.tables import decoded_table, encoded_table
@@ -57,9 +52,7 @@ if TYPE_CHECKING:
 
 JOB: Final = "job.json"
 SPEC: Final = "spec.json"
-PROVENANCE: Final = "provenance.json"
 BEST: Final = "best.json"
-ITERATIONS: Final = "history/iterations.json"
 EVALUATIONS: Final = "history/evaluations.parquet"
 ASKS: Final = "history/asks.parquet"
 REEVALUATIONS: Final = "history/reevaluations.parquet"
@@ -79,20 +72,10 @@ class _Document(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
 
-class BestFound(_Document):
-    """The best design's place and fitness in double precision."""
-
-    iteration: int = Field(ge=0)
-    particle: int = Field(ge=0)
-    fitness: float
-
-
 class JobDocument(_Document):
     """The job's metadata."""
 
     id: str = Field(max_length=64)
-    name: str
-    kind: str
     state: JobState
     created_at: datetime
     started_at: datetime | None
@@ -100,28 +83,18 @@ class JobDocument(_Document):
     finished_at: datetime | None
     iterations: int = Field(ge=1)
     evaluations: int = Field(ge=1)
-    lineage: Lineage | None
     budgets: tuple[Annotated[int, Field(ge=1, le=1_000_000)], ...] = Field(
         min_length=1, max_length=100
     )
-    best: BestFound | None
-
-
-class ProvenanceDocument(_Document):
-    """Provenance of the numbers and of the file, and the identity of each robot's kernel."""
-
-    records: tuple[ProvenanceRecord, ...] = Field(min_length=1)
-    written_by: JobProvenance
-    kernels: tuple[str, ...]
 
 
 class ChainDocument(_Document):
-    """Stored documents that the chain covers besides the tables."""
+    """Stored documents that the chain covers besides the tables; the spec is as submitted."""
 
     version: int
     spec: dict[str, Any]
     lineage: dict[str, Any] | None
-    provenance: tuple[dict[str, Any], ...] | None
+    provenance: tuple[dict[str, Any], ...] = Field(min_length=1)
     asks: tuple[str | None, ...]
     digests: tuple[str | None, ...]
 
@@ -186,7 +159,9 @@ _THRIFT: Final = 1 << 22
 _WITH_ROBOTS: Final = (SPEC, CHAIN)
 """Documents that hold specs."""
 
-M = TypeVar("M", bound=BaseModel)
+T = TypeVar("T")
+
+_LINEAGE: Final[TypeAdapter[Lineage | None]] = TypeAdapter(Lineage | None)
 
 Floats = NDArray[np.float64]
 
@@ -195,9 +170,11 @@ Floats = NDArray[np.float64]
 class Evidence:
     """The contents of an evidence file."""
 
+    members: Mapping[str, bytes]
     job: JobDocument
     spec: AnySpec
-    provenance: ProvenanceDocument
+    provenance: ProvenanceRecords
+    lineage: Lineage | None
     columns: EvaluationColumns
     asked: tuple[Floats, ...]  # (n, d) positions, by iteration
     reevaluated: EvaluationColumns | None  # in double precision; None for a search in double
@@ -207,24 +184,26 @@ class Evidence:
 
 def read_evidence(members: Mapping[str, bytes]) -> Evidence:
     """Read the members of an archive."""
-    spec = _spec(_member(members, SPEC))
-    job = _parsed(JobDocument, members, JOB)
-    columns = _evaluations(members, EVALUATIONS, spec)
+    spec = _parsed(SPECS.validate_python, members, SPEC)
+    job = _parsed(JobDocument.model_validate, members, JOB)
+    chain = _parsed(ChainDocument.model_validate, members, CHAIN)
     reevaluated = None
     if spec.precision != "double":
         reevaluated = _evaluations(members, REEVALUATIONS, spec.in_double())
     evidence = Evidence(
+        members,
         job,
         spec,
-        _parsed(ProvenanceDocument, members, PROVENANCE),
-        columns,
+        _valid(RECORDS.validate_python, chain.provenance, CHAIN),
+        _valid(_LINEAGE.validate_python, chain.lineage, CHAIN),
+        _evaluations(members, EVALUATIONS, spec),
         _positions(_member(members, ASKS), spec),
         reevaluated,
         {
-            name: _parsed(RecordedWalk, members, f"recordings/{name}.json")
+            name: _parsed(RecordedWalk.model_validate, members, f"recordings/{name}.json")
             for name in spec.recording_ids
         },
-        _parsed(ChainDocument, members, CHAIN),
+        chain,
     )
     _check_order(evidence)
     return evidence
@@ -249,10 +228,7 @@ def check_robots(members: Mapping[str, bytes]) -> None:
 
 
 def _check_order(evidence: Evidence) -> None:
-    """Check that job and spec agree, and iterations are whole, in order, as large as the asks."""
-    job, spec = evidence.job, evidence.spec
-    if (job.name, job.kind) != (spec.name, spec.kind):
-        raise BadArchive(f"{JOB} is of a {job.kind} job {job.name!r}, {SPEC} of another")
+    """Check that iterations are whole, in order, and as large as the asks."""
     job, columns = evidence.job, evidence.columns
     sizes = [len(positions) for positions in evidence.asked]
     expected = np.repeat(np.arange(len(sizes)), sizes)
@@ -268,32 +244,22 @@ def _check_order(evidence: Evidence) -> None:
         )
 
 
-def _spec(content: bytes) -> AnySpec:
+def _parsed(validate: Callable[[Any], T], members: Mapping[str, bytes], name: str) -> T:
+    return _valid(validate, parsed_json(_member(members, name), name), name)
+
+
+def _valid(validate: Callable[[Any], T], document: Any, name: str) -> T:
     try:
-        return SPECS.validate_python(parsed_json(content, SPEC))
+        return validate(document)
     except ValidationError as error:
-        raise _unreadable(SPEC, error) from error
-    except BadArchive:
-        raise
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise BadArchive(
+            f"{name} cannot be read by this gaitswarm: {where}: {message_of(first)[:200]}"
+        ) from error
     except Exception as error:
-        # A robot's files are read with it, by parsers of other projects.
-        raise BadArchive(f"{SPEC} cannot be read: {type(error).__name__}") from error
-
-
-def _parsed(kind: type[M], members: Mapping[str, bytes], name: str) -> M:
-    document = parsed_json(_member(members, name), name)
-    try:
-        return kind.model_validate(document)
-    except ValidationError as error:
-        raise _unreadable(name, error) from error
-
-
-def _unreadable(name: str, error: ValidationError) -> BadArchive:
-    first = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(str(part) for part in first["loc"])
-    return BadArchive(
-        f"{name} cannot be read by this gaitswarm: {where}: {message_of(first)[:200]}"
-    )
+        # A robot's files are read with its spec, by parsers of other projects.
+        raise BadArchive(f"{name} cannot be read: {type(error).__name__}") from error
 
 
 def _member(members: Mapping[str, bytes], name: str) -> bytes:
@@ -387,26 +353,29 @@ def evidence(service: JobService, job_id: str) -> bytes:
         files |= {f"{CERTIFICATES}/{certificate_id}/{name}": c for name, c in part.files.items()}
         if part.summary is not None:
             shown.append(CertificateOnPage(part.summary, place, is_best=not is_other))
-    figures = dict(pictures(job.spec, run.best, run.iterations))
-    files |= {f"figures/{name}.svg": picture.encode() for name, picture in figures.items()}
-    files[PAGE] = page(job, run.best, run.provenance, figures, shown, tuple(files)).encode()
+    # A running job commits more meanwhile; the file ends where the job did when it was read.
+    committed = every(
+        lambda after: service.store.iterations(
+            job.id, after=None if after is None else int(after), limit=_PIECE
+        )
+    )
+    views = (IterationView.model_validate(one) for one in committed)
+    iterations = [view for view in views if view.index < job.progress.iterations]
+    files[PAGE] = page(job, run.best, iterations, shown, tuple(files)).encode()
     return archived(files)
 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """The stored data of one job: its members without page and figures, and parts of them."""
+    """The stored data of one job: its members without the page, and parts of them."""
 
     files: Mapping[str, bytes]
     columns: EvaluationColumns
-    iterations: Sequence[IterationView]
-    provenance: ProvenanceDocument
     best: BestView | None
     summary: CertificateView | None  # of a certificate with at least one drawn world
 
 
 def _run(service: JobService, job: Job) -> _Run:
-    # A running job commits more meanwhile; the file ends where the job did when it was read.
     spec, store, end = job.spec, service.store, job.progress.iterations
     columns = service.columns(job)
     columns = columns.rows(slice(int(np.searchsorted(columns.iteration, end))))
@@ -420,27 +389,26 @@ def _run(service: JobService, job: Job) -> _Run:
         for first in range(0, end, _PIECE)
         for link in store.links(job.id, first, min(first + _PIECE, end))
     ]
-    committed = every(
-        lambda after: store.iterations(
-            job.id, after=None if after is None else int(after), limit=_PIECE
-        )
-    )
-    iterations = [IterationView.model_validate(one) for one in committed if one.index < end]
-    provenance = ProvenanceDocument(
-        records=job.provenance, written_by=job_provenance(spec), kernels=kernels_of(spec)
-    )
     stored = store.chain_documents(job.id)
     documents: dict[str, object] = {
-        JOB: _job(job, best),
+        JOB: JobDocument(
+            id=job.id,
+            state=job.state,
+            created_at=job.created_at,
+            started_at=job.started_at,
+            updated_at=job.updated_at,
+            finished_at=job.finished_at,
+            iterations=end,
+            evaluations=job.progress.evaluations,
+            budgets=budgets_of(job),
+        ),
         SPEC: spec,
-        PROVENANCE: provenance,
         BEST: view,
-        ITERATIONS: iterations,
         CHAIN: ChainDocument(
             version=CHAIN_VERSION,
             spec=stored.spec,
             lineage=stored.lineage,
-            provenance=stored.provenance,
+            provenance=stored.provenance or (),
             asks=[link.ask_digest for link in links],
             digests=[link.digest for link in links],
         ),
@@ -458,13 +426,7 @@ def _run(service: JobService, job: Job) -> _Run:
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
     for number, robot in enumerate(spec.robot_sources):
         files |= robot_members(f"robots/{number}", robot)
-    return _Run(files, columns, iterations, provenance, view, summary)
-
-
-def kernels_of(spec: AnySpec) -> tuple[str, ...]:
-    """Identity of the kernel of each robot of a job."""
-    robots = map(load_robot, spec.robot_sources)
-    return tuple(kernel_identity(robot, spec.precision).hex() for robot in robots)
+    return _Run(files, columns, view, summary)
 
 
 def best_of(columns: EvaluationColumns, reevaluated: EvaluationColumns | None) -> Evaluation | None:
@@ -476,19 +438,12 @@ def best_of(columns: EvaluationColumns, reevaluated: EvaluationColumns | None) -
     (best,) = evaluations_of(judged.rows(np.array([row])))
     if reevaluated is None:
         return best
-    place = row_of(columns, (best.iteration, best.particle))
-    (searched,) = evaluations_of(columns.rows(np.array([place])))
+    (rows,) = np.nonzero(
+        (columns.iteration == best.iteration) & (columns.particle == best.particle)
+    )
+    (searched,) = evaluations_of(columns.rows(rows))
     again = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
     return replace(searched, reevaluation=again)
-
-
-def row_of(columns: EvaluationColumns, place: Place) -> int:
-    """Find an evaluation. Raises LookupError if there is none."""
-    iteration, particle = place
-    (rows,) = np.nonzero((columns.iteration == iteration) & (columns.particle == particle))
-    if len(rows) != 1:
-        raise LookupError(f"there is no design {iteration}.{particle}")
-    return int(rows[0])
 
 
 def in_double(
@@ -520,28 +475,6 @@ def certified_place(
     if not len(rows):
         return None
     return int(columns.iteration[rows[0]]), int(columns.particle[rows[0]])
-
-
-def _job(job: Job, best: Evaluation | None) -> JobDocument:
-    found = None
-    if best is not None:
-        judged = best.reevaluation or best
-        found = BestFound(iteration=best.iteration, particle=best.particle, fitness=judged.fitness)
-    return JobDocument(
-        id=job.id,
-        name=job.spec.name,
-        kind=job.spec.kind,
-        state=job.state,
-        created_at=job.created_at,
-        started_at=job.started_at,
-        updated_at=job.updated_at,
-        finished_at=job.finished_at,
-        iterations=job.progress.iterations,
-        evaluations=job.progress.evaluations,
-        lineage=job.lineage,
-        budgets=budgets_of(job),
-        best=found,
-    )
 
 
 def _asks(spec: AnySpec, links: Sequence[Link]) -> bytes:

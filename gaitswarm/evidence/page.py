@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from pydantic import BaseModel
 
 from gaitswarm.evidence import FORMAT, MANIFEST, VERSION
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.settings import place_of
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.surface import SurfaceRequest, run_surface
 from gaitswarm.views.job import BestView, IterationView
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _INK: Final = "#1f3a5f"
@@ -49,8 +45,7 @@ class CertificateOnPage:
 def page(
     job: Job,
     best: BestView | None,
-    provenance: BaseModel,
-    figures: Mapping[str, str],
+    iterations: Sequence[IterationView],
     certificates: Sequence[CertificateOnPage],
     files: Sequence[str],
 ) -> str:
@@ -71,8 +66,7 @@ def page(
         best=best,
         tunes_a_drive=isinstance(job.spec, JobSpec),
         units={variable.name: variable.unit for variable in job.spec.design_space().variables},
-        provenance=provenance,
-        figures=figures.values(),
+        figure=_svg(draw_convergence(iterations, title="Fitness over iterations")),
         certificates=certificates,
         worst=_WORST,
         files=sorted(files),
@@ -87,33 +81,17 @@ def _number(value: float | str | None) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def pictures(
-    spec: AnySpec, best: BestView | None, iterations: Sequence[IterationView]
-) -> Iterator[tuple[str, str]]:
-    """Draw a job's figures as SVG, by name."""
-    yield "convergence", _svg(draw_convergence(iterations, title="Fitness over iterations"))
-    if best is None:
-        return
-    utilities = {name: result.utility for name, result in best.scenarios.items()}
-    yield "scenarios", _svg(_bars(utilities))
-    if isinstance(spec, JobSpec):
-        request = SurfaceRequest(design=dict(best.design), error_points=49, current_points=25)
-        try:
-            view = run_surface(spec.controller, request)
-        except InvalidRequest:
-            # A controller that is not fuzzy has none.
-            return
-        for output in view.outputs:
-            yield f"surface-{output.name}", _svg(_heat_map(output.name, np.array(output.table)))
-
-
 def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figure:
     """Draw fitness (minimized) over iterations: best so far, median, and the best-worst band."""
+    from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
     if not iterations:
         raise InvalidRequest("the job has no committed iteration to draw yet")
-    figure, axes = _figure(4.5, title)
+    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_title(title, loc="left", weight="bold")
+    axes.spines[["top", "right"]].set_visible(False)
     index = [i.index for i in iterations]
     best, median, worst, so_far = (
         # None becomes NaN.
@@ -136,39 +114,6 @@ def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figu
     axes.grid(visible=True, which="both", color="0.9", lw=0.6)
     axes.legend(frameon=False, loc="upper right")
     return figure
-
-
-def _bars(utilities: Mapping[str, float | None]) -> Figure:
-    figure, axes = _figure(1.2 + 0.35 * len(utilities), "Best design: utility in each case")
-    widths = [np.nan if value is None else value for value in utilities.values()]
-    drawn = axes.barh(list(utilities), widths, color=_INK)
-    axes.bar_label(drawn, [_number(value) for value in utilities.values()], padding=4.0)
-    axes.invert_yaxis()
-    axes.set_xlabel("utility, minimized")
-    return figure
-
-
-def _heat_map(name: str, table: np.ndarray) -> Figure:
-    figure, axes = _figure(4.5, f"Output {name} over angle error and motor current")
-    largest = np.abs(table).max()
-    drawn = axes.imshow(
-        table.T, cmap="coolwarm", vmin=-largest, vmax=largest, origin="lower", aspect="auto"
-    )
-    axes.set(xticks=[], yticks=[])
-    axes.set_xlabel("angle error, from its least to its greatest")
-    axes.set_ylabel("motor current, from its least to its greatest")
-    figure.colorbar(drawn, ax=axes)
-    return figure
-
-
-def _figure(height: float, title: str) -> tuple[Figure, Axes]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.0, height), layout="constrained")
-    axes = figure.add_subplot()
-    axes.set_title(title, loc="left", weight="bold")
-    axes.spines[["top", "right"]].set_visible(False)
-    return figure, axes
 
 
 def _svg(figure: Figure) -> str:

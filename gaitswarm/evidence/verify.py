@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import os
 import re
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from pydantic_core import from_json, to_json
 
 from gaitswarm.evidence.archive import (
     BEST,
     CERTIFICATES,
     CHAIN,
     JOB,
+    SPEC,
     SUMMARY,
     WORST,
     Evidence,
@@ -29,11 +31,9 @@ from gaitswarm.evidence.archive import (
     check_hashes,
     check_robots,
     in_double,
-    kernels_of,
     parsed_json,
     read_evidence,
     robot_members,
-    row_of,
 )
 from gaitswarm.services.optimizer.analysis.certificate import certificate as certificate_view
 from gaitswarm.services.optimizer.analysis.fork import retraced
@@ -48,12 +48,10 @@ from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import duration
-from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, Reevaluation
-from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Reevaluation
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecord, job_provenance
+from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord, job_provenance
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import finite
@@ -73,9 +71,6 @@ from gaitswarm.views.verification import (
     VerificationView,
 )
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
-
-if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.analysis.verification import HistoryCheck
 
 _DIGITS: Final = 32
 
@@ -103,36 +98,6 @@ class _Report:
         self.checks.append(
             CheckView(name=name, passed=passed, detail=detail, certificate=certificate)
         )
-
-    def replay(
-        self,
-        spec: AnySpec,
-        columns: EvaluationColumns,
-        best: tuple[Place, EvaluationColumns | None] | None,
-        recordings: Recordings,
-        certificate: str | None = None,
-    ) -> Answer:
-        """Simulate evaluations again and compare every bit.
-
-        best: place of the best design, with its reevaluation in double precision if there is one.
-        """
-        if isinstance(spec, CertificateSpec) and spec.engines:
-            # Other engines have other bits on other machines.
-            engines = columns.designs[:, spec.design_space().names.index(ENGINE)]
-            columns = columns.rows(np.flatnonzero(engines == 0.0))
-        tables, among = [(spec, columns)], ""
-        if best is not None and best[0] in zip(columns.iteration, columns.particle, strict=True):
-            among = ", the best among them,"
-            if best[1] is not None:
-                tables.append((spec.in_double(), best[1]))
-        differences = list(_differences(tables, recordings, certificate))
-        self.differences += differences
-        self.replayed += len(columns)
-        what = f"{len(columns)} evaluations{among} in {len(spec.case_names)} cases"
-        if not differences:
-            return True, f"{what}: every bit is the same"
-        evaluations = len({(d.iteration, d.particle) for d in differences})
-        return False, f"{what}: {len(differences)} numbers of {evaluations} of them differ"
 
     def fields(self) -> dict[str, Any]:
         """Fields of a `ReplayedView` but for the seed."""
@@ -171,9 +136,21 @@ def run_verification(
     if replay and job.readable:
         report.provenance += _changes(job.spec, job.provenance)
     if replay and history.sizes:
-        rng = np.random.default_rng(seed)
-        answer = _replay_stored(service, job, history, report, replay, rng, check)
-        report.add("replay", answer)
+        spec, store, progress = job.spec, service.store, job.progress
+
+        def read(iteration: int) -> Evaluations:
+            columns = store.evaluation_columns(job.id, iteration, iteration + 1)
+            if columns is None:
+                raise NotFound(f"job {job.id} has no iteration {iteration} any more")
+            again = store.reevaluations(job.id, iteration, iteration + 1)
+            return columns, None if spec.precision == "double" else in_double(columns, again)
+
+        best = None
+        if progress.best_iteration is not None and progress.best_particle is not None:
+            best = (progress.best_iteration, progress.best_particle)
+        drawn = _Drawn(history.sizes, best, np.random.default_rng(seed), replay)
+        recordings = store.recordings(spec.recording_ids)
+        report.add("replay", _replay(report, spec, recordings, drawn, read, check=check))
     return HistoryVerificationView(
         job=job.id,
         iterations=history.iterations,
@@ -182,45 +159,6 @@ def run_verification(
         seed=seed,
         **report.fields(),
     )
-
-
-def _replay_stored(
-    service: JobService,
-    job: Job,
-    history: HistoryCheck,
-    report: _Report,
-    count: int,
-    drawn: np.random.Generator,
-    check: Callable[[float], None],
-) -> Answer:
-    """Repeat drawn evaluations and the best one; only their iterations are read."""
-    spec, store, progress = job.spec, service.store, job.progress
-    refused = _why_no_replay(spec)
-    if refused is not None:
-        return refused
-    ends = np.cumsum(history.sizes)
-    begins = ends - history.sizes
-    rows = drawn.permutation(int(ends[-1]))[:count]
-    best = None
-    if progress.best_iteration is not None and progress.best_particle is not None:
-        iteration = progress.best_iteration
-        if iteration < len(ends):
-            rows = np.append(rows, begins[iteration] + progress.best_particle)
-            best = (iteration, progress.best_particle)
-    rows = np.unique(rows)
-    recordings = store.recordings(spec.recording_ids)
-    check(len(rows) * duration(spec, spec.cases(recordings)))
-    at = np.searchsorted(ends, rows, side="right")
-    pieces, again = [], None
-    for iteration in np.unique(at).tolist():
-        columns = store.evaluation_columns(job.id, iteration, iteration + 1)
-        if columns is None:
-            raise NotFound(f"job {job.id} has no iteration {iteration} any more")
-        pieces.append(columns.rows(rows[at == iteration] - begins[iteration]))
-        if spec.precision != "double" and best is not None and iteration == best[0]:
-            again = in_double(columns, store.reevaluations(job.id, iteration, iteration + 1))
-    chosen = None if best is None else (best, again)
-    return report.replay(spec, joined(pieces), chosen, recordings)
 
 
 def verify(
@@ -272,7 +210,7 @@ def verify(
             digests = job.chain.digests
             at = digests.index(head) if head in digests else None
             report.add("head", _head(head, at, len(job.asked)))
-        _check_certificates(job, members, report, replay, seed)
+        _check_certificates(job, report, replay, seed)
     except BadArchive as error:
         report.add("contents" if report.checks else "archive", (False, str(error)))
     digest = hashlib.sha256(content).hexdigest()
@@ -293,46 +231,46 @@ def _check_run(
     members: Mapping[str, bytes],
     report: _Report,
     replay: int,
-    drawn: np.random.Generator,
+    rng: np.random.Generator,
     certificate: str | None = None,
 ) -> Evidence:
     """Check one run; `certificate` is its id, None for the job itself."""
     evidence = read_evidence(members)
     rows = f"{len(evidence.columns)} evaluations in {len(evidence.asked)} iterations"
     report.add("contents", (True, f"{rows}, as in the spec"), certificate)
-    checks: dict[str, Callable[[], Answer]] = {
-        "robot": lambda: _robot(evidence, members),
-        "fitness": lambda: _fitness(evidence),
-        "best": lambda: _best(evidence, members),
-        "designs": lambda: _designs(evidence),
-        "search": lambda: _search(evidence),
-        "chain": lambda: _chain(evidence),
+    checks = {
+        "robot": _robot,
+        "fitness": _fitness,
+        "best": _best,
+        "designs": _designs,
+        "search": _search,
+        "chain": _chain,
     }
-    if SUMMARY in members:
-        checks["summary"] = lambda: _summary(evidence, members)
+    if certificate is not None or SUMMARY in members:
+        checks["summary"] = _summary
     if replay:
-        checks["replay"] = lambda: _replay(evidence, report, replay, drawn, certificate)
+        checks["replay"] = lambda evidence: _replay_file(evidence, report, replay, rng, certificate)
     for name, check in checks.items():
-        report.add(name, _tried(check), certificate)
+        report.add(name, _tried(check, evidence), certificate)
     whose = "" if certificate is None else f"certificate {certificate}: "
-    report.provenance += [f"{whose}{change}" for change in _explained_changes(evidence)]
+    changes = _changes(evidence.spec, evidence.provenance)
+    report.provenance += [f"{whose}{change}" for change in changes]
     return evidence
 
 
-def _check_certificates(
-    job: Evidence, members: Mapping[str, bytes], report: _Report, replay: int, seed: int
-) -> None:
+def _check_certificates(job: Evidence, report: _Report, replay: int, seed: int) -> None:
     """Check every certificate in the evidence of a job."""
     folders: dict[str, dict[str, bytes]] = {}
-    for name, content in members.items():
+    for name, content in job.members.items():
         folder, _, rest = name.partition("/")
         job_id, slash, member = rest.partition("/")
         if folder == CERTIFICATES and slash:
             folders.setdefault(job_id, {})[member] = content
-    for number, (job_id, own) in enumerate(sorted(folders.items())):
-        drawn = np.random.default_rng((seed, number))
+    for number, (job_id, members) in enumerate(sorted(folders.items())):
+        rng = np.random.default_rng((seed, number))
         try:
-            _check_certificate(job, job_id, own, report, replay, drawn)
+            certificate = _check_run(members, report, replay, rng, job_id)
+            report.add("design", _tried(partial(_design, job, job_id), certificate), job_id)
         except BadArchive as error:
             report.add("contents", (False, str(error)), job_id)
     if folders:
@@ -342,34 +280,18 @@ def _check_certificates(
         report.add("certificates", (None, f"there is none; {remedy} includes it"))
 
 
-def _check_certificate(
-    job: Evidence,
-    job_id: str,
-    members: Mapping[str, bytes],
-    report: _Report,
-    replay: int,
-    drawn: np.random.Generator,
-) -> None:
-    if SUMMARY not in members:
-        raise BadArchive(f"it has no {SUMMARY}")
-    certificate = _check_run(members, report, replay, drawn, job_id)
-    if certificate.job.id != job_id:
-        raise BadArchive(f"{JOB} is of another certificate than its folder")
-    report.add("design", _tried(lambda: _design(job, certificate)), job_id)
-
-
-def _tried(check: Callable[[], Answer]) -> Answer:
+def _tried(check: Callable[[Evidence], Answer], evidence: Evidence) -> Answer:
     try:
-        return check()
+        return check(evidence)
     except Unavailable:
         raise
     except Exception as error:  # noqa: BLE001 - the numbers may not be gaitswarm's
         return False, f"cannot be computed: {type(error).__name__}: {str(error)[:200]}"
 
 
-def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+def _robot(evidence: Evidence) -> Answer:
     """Check the robots' files against the digests of the provenance, and against the spec."""
-    content = b""
+    content, members = b"", evidence.members
     files: dict[str, bytes] = {}
     for number, source in enumerate(evidence.spec.robot_sources):
         folder = f"robots/{number}"
@@ -378,7 +300,7 @@ def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
                 return False, f"it has no {name}"
             content += members[name]
         files |= robot_members(folder, source)
-    simulation = evidence.provenance.records[-1].provenance.simulation
+    simulation = evidence.provenance[-1].provenance.simulation
     if hashlib.sha256(content).hexdigest()[:_DIGITS] != simulation.robot_digest:
         return False, "the robot's files are not those that the provenance names"
     if simulation.code_digest == job_provenance(evidence.spec).simulation.code_digest:
@@ -404,18 +326,20 @@ def _fitness(evidence: Evidence) -> Answer:
     return True, f"{count} of {count} follow from the raw objectives, to the bit"
 
 
-def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+def _best(evidence: Evidence) -> Answer:
     """Check that the best design is the earliest of least fitness in double precision."""
-    best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
-    if best is None or said is None:
-        return best is None and said is None, "no design has succeeded in every case"
-    place, fitness = (best.iteration, best.particle), (best.reevaluation or best).fitness
-    if (said.iteration, said.particle, said.fitness) != (*place, fitness):
-        return False, f"design {place_of(*place)} is the best with {fitness!r}, not the named one"
-    shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
-    if parsed_json(members.get(BEST, b""), BEST) != shown:
-        return False, f"{BEST} does not show design {place_of(*place)}"
-    return True, f"design {place_of(*place)}, {fitness!r}, is the least of all"
+    best, view = best_of(evidence.columns, evidence.reevaluated), None
+    result = "no design has succeeded in every case"
+    if best is not None:
+        view = BestView.from_evaluation(best, evidence.spec)
+        result = f"design {place_of(*_place(best))}, {view.fitness!r}, is the least of all"
+    if parsed_json(evidence.members.get(BEST, b""), BEST) != from_json(to_json(view)):
+        return False, f"{BEST} shows another one: {result}"
+    return True, result
+
+
+def _place(best: Evaluation) -> Place:
+    return best.iteration, best.particle
 
 
 def _designs(evidence: Evidence) -> Answer:
@@ -429,7 +353,7 @@ def _designs(evidence: Evidence) -> Answer:
 
 def _search(evidence: Evidence) -> Answer:
     """Check that the search proposes the same designs again."""
-    spec, lineage = evidence.spec, evidence.job.lineage
+    spec, lineage = evidence.spec, evidence.lineage
     method = METHODS[spec.search.name]
     if method.missing:
         return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
@@ -451,14 +375,9 @@ def _chain(evidence: Evidence) -> Answer:
     said, spec, again = evidence.chain, evidence.spec, evidence.reevaluated
     if said.version != CHAIN_VERSION:
         return None, f"it is of version {said.version}, which this gaitswarm does not compute"
-    lineage = None if said.lineage is None else Lineage.model_validate(said.lineage)
     submitted = SPECS.validate_python(said.spec)
-    if (
-        spec not in (submitted, submitted.with_budget(spec.iterations))
-        or lineage != evidence.job.lineage
-        or RECORDS.validate_python(said.provenance or ()) != evidence.provenance.records
-    ):
-        return False, f"{CHAIN} has another spec, lineage or provenance than the rest of the file"
+    if spec not in (submitted, submitted.with_budget(spec.iterations)):
+        return False, f"{CHAIN} has another spec than {SPEC}"
     reevaluations = {} if again is None else dict(_reevaluations(again))
     chain = Chain(ChainDocuments(said.spec, said.lineage, said.provenance), spec)
     links = zip(evidence.asked, said.asks, said.digests, strict=True)
@@ -494,14 +413,14 @@ def _head(head: str, at: int | None, iterations: int) -> Answer:
     return True, f"iteration {at} has the digest {head}; {since} more were committed since"
 
 
-def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+def _summary(evidence: Evidence) -> Answer:
     """Check that a certificate's summary follows from its evaluations."""
     spec = evidence.spec
     if not isinstance(spec, CertificateSpec):
         return False, f"a job of kind {spec.kind} has no {SUMMARY}"
     view = certificate_view(evidence.job.id, spec, evidence.columns, most=WORST)
-    said = parsed_json(members[SUMMARY], SUMMARY)
-    where = next(_unequal(json.loads(view.model_dump_json()), said, ""), None)
+    said = parsed_json(evidence.members.get(SUMMARY, b""), SUMMARY)
+    where = next(_unequal(from_json(to_json(view)), said, ""), None)
     if where is not None:
         return False, f"{SUMMARY} has another {where} than follows from the evaluations"
     return True, f"{SUMMARY} follows from {len(evidence.columns)} evaluations"
@@ -522,12 +441,15 @@ def _unequal(here: Any, there: Any, path: str) -> Iterator[str]:
         yield path
 
 
-def _design(job: Evidence, certificate: Evidence) -> Answer:
+def _design(job: Evidence, folder: str, certificate: Evidence) -> Answer:
     """Check that the certified design is one of the job's."""
-    best, place = job.job.best, certified_place(job.spec, job.columns, certificate.spec)
+    if certificate.job.id != folder:
+        return False, f"{JOB} is of another certificate than its folder"
+    best = best_of(job.columns, job.reevaluated)
+    place = certified_place(job.spec, job.columns, certificate.spec)
     if place is None:
         return False, "its design is not one of this job"
-    is_best = best is not None and place == (best.iteration, best.particle)
+    is_best = best is not None and place == _place(best)
     return True, f"it is of design {place_of(*place)}, {'the best' if is_best else 'not the best'}"
 
 
@@ -541,43 +463,81 @@ def _changes(spec: AnySpec, records: Iterable[ProvenanceRecord]) -> list[str]:
     ]
 
 
-def _explained_changes(evidence: Evidence) -> list[str]:
-    """Changes of provenance on this machine, and what they mean."""
-    changes = _changes(evidence.spec, evidence.provenance.records)
-    if not changes:
-        return []
-    kernels = "the kernels' source differs from when the file was written: results may differ"
-    if kernels_of(evidence.spec) == evidence.provenance.kernels:
-        kernels = (
-            "the kernels' source is the same as when the file was written: physics and"
-            " control loop are the same, and the changes are outside of them"
-        )
-    replay = "equal bits in the replay show that these changes do not matter for what was replayed"
-    return [*changes, kernels, replay]
+Evaluations = tuple[EvaluationColumns, EvaluationColumns | None]
+"""Evaluations, and those of them that were repeated in double precision if the search's is not."""
 
 
-def _replay(
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """Evaluations to repeat: some drawn from all iterations, and the best one."""
+
+    sizes: Sequence[int]  # designs by iteration
+    best: Place | None
+    rng: np.random.Generator
+    count: int
+
+
+def _replay_file(
     evidence: Evidence,
     report: _Report,
     count: int,
-    drawn: np.random.Generator,
+    rng: np.random.Generator,
     certificate: str | None,
 ) -> Answer:
-    """Repeat drawn evaluations and the best one."""
-    spec, columns, reevaluated = evidence.spec, evidence.columns, evidence.reevaluated
+    def read(iteration: int) -> Evaluations:
+        again = evidence.reevaluated
+        again = None if again is None else again.of_iteration(iteration)
+        return evidence.columns.of_iteration(iteration), again
+
+    best = best_of(evidence.columns, evidence.reevaluated)
+    sizes = [len(positions) for positions in evidence.asked]
+    drawn = _Drawn(sizes, None if best is None else _place(best), rng, count)
+    return _replay(report, evidence.spec, evidence.recordings, drawn, read, certificate)
+
+
+def _replay(
+    report: _Report,
+    spec: AnySpec,
+    recordings: Recordings,
+    drawn: _Drawn,
+    read: Callable[[int], Evaluations],
+    certificate: str | None = None,
+    check: Callable[[float], None] = lambda _seconds: None,
+) -> Answer:
+    """Simulate evaluations again and compare every bit; only their iterations are read."""
     refused = _why_no_replay(spec)
     if refused is not None:
         return refused
-    rows, best = drawn.permutation(len(columns))[:count], best_of(columns, reevaluated)
-    chosen = None
+    ends = np.cumsum(drawn.sizes)
+    begins = ends - drawn.sizes
+    rows = drawn.rng.permutation(int(ends[-1]))[: drawn.count]
+    best = drawn.best if drawn.best is not None and drawn.best[0] < len(ends) else None
     if best is not None:
-        place, again = (best.iteration, best.particle), None
-        rows = np.append(rows, row_of(columns, place))
-        if reevaluated is not None:
-            again = reevaluated.rows(np.array([row_of(reevaluated, place)]))
-        chosen = (place, again)
-    repeated = columns.rows(np.unique(rows))
-    return report.replay(spec, repeated, chosen, evidence.recordings, certificate)
+        rows = np.append(rows, begins[best[0]] + best[1])
+    rows = np.unique(rows)
+    check(len(rows) * duration(spec, spec.cases(recordings)))
+    at = np.searchsorted(ends, rows, side="right")
+    pieces, tables, among = [], [], ""
+    for iteration in np.unique(at).tolist():
+        evaluations, again = read(iteration)
+        pieces.append(evaluations.rows(rows[at == iteration] - begins[iteration]))
+        if again is not None and best is not None and iteration == best[0]:
+            tables.append((spec.in_double(), again))
+    columns = joined(pieces)
+    if isinstance(spec, CertificateSpec) and spec.engines:
+        # Other engines have other bits on other machines.
+        engines = columns.designs[:, spec.design_space().names.index(ENGINE)]
+        columns = columns.rows(np.flatnonzero(engines == 0.0))
+    if best is not None and best in zip(columns.iteration, columns.particle, strict=True):
+        among = ", the best among them,"
+    differences = list(_differences([(spec, columns), *tables], recordings, certificate))
+    report.differences += differences
+    report.replayed += len(columns)
+    what = f"{len(columns)} evaluations{among} in {len(spec.case_names)} cases"
+    if not differences:
+        return True, f"{what}: every bit is the same"
+    count = len({(d.iteration, d.particle) for d in differences})
+    return False, f"{what}: {len(differences)} numbers of {count} of them differ"
 
 
 def _why_no_replay(spec: AnySpec) -> Answer | None:

@@ -1122,7 +1122,7 @@ class Jobs(ABC):
 
         Returns:
             A zip archive as in docs/evidence.md: spec, robot, provenance, all evaluations, finished
-            certificates of its designs, figures and a page; identical for the same stored jobs.
+            certificates of its designs and a page; identical for the same stored jobs.
 
         Raises:
             Conflict: The job has no committed iteration yet.

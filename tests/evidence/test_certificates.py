@@ -110,7 +110,7 @@ def test_another_summary_another_world_and_another_design_are_caught(
     assert "designs" in of(EVALUATIONS, with_cells(kinder))
     assert of("spec.json", changed({"seed": 99})) == ["search", "chain", "summary"]
     assert of("spec.json", lambda _: b"{}") == ["contents"]
-    assert of("job.json", changed({"id": certified.of_another})) == ["summary", "contents"]
+    assert of("job.json", changed({"id": certified.of_another})) == ["summary", "design"]
 
 
 def test_the_last_digits_of_a_summary_may_be_those_of_another_library(

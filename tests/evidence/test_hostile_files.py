@@ -87,7 +87,7 @@ def test_names_that_occur_twice_are_refused() -> None:
 def test_every_member_that_counts_is_missed(proved: Proved) -> None:
     members = unzipped(proved.content)
     assert f"it has no {MANIFEST}" in refusal(zipped({"a": b""}))
-    for name in ("job.json", "spec.json", "provenance.json", EVALUATIONS, "history/asks.parquet"):
+    for name in ("job.json", "spec.json", CHAIN, EVALUATIONS, "history/asks.parquet"):
         kept = {n: c for n, c in members.items() if n not in (name, MANIFEST)}
         assert refusal(archived(kept)) == f"it has no {name}"
 
@@ -104,7 +104,7 @@ DOCUMENTS: dict[str, bytes] = {
 
 @pytest.mark.parametrize("document", DOCUMENTS.values(), ids=DOCUMENTS)
 def test_documents_that_are_none_are_refused(proved: Proved, document: bytes) -> None:
-    for name in ("spec.json", "job.json", "provenance.json"):
+    for name in ("spec.json", "job.json", CHAIN):
         assert name in refusal(tampered(proved.content, {name: lambda _: document}))
 
 
@@ -232,7 +232,7 @@ def test_tables_that_are_not_of_the_job_are_refused(
 def test_flipped_bits_anywhere_never_end_in_anything_but_a_finding(proved: Proved) -> None:
     draw = random.Random(1)
     members = unzipped(proved.content)
-    names = [n for n in members if n.startswith(("job", "spec", "prov", "history"))]
+    names = [n for n in members if n.startswith(("job", "spec", "history"))]
 
     def flipped(content: bytes) -> bytes:
         damaged = bytearray(content)

@@ -172,8 +172,6 @@ def test_one_bit_of_a_file_is_caught_by_its_hash(proved: Proved) -> None:
 def test_another_best_another_design_another_search_and_another_robot_are_caught(
     proved: Proved,
 ) -> None:
-    worse = {"best": {"iteration": 0, "particle": 0, "fitness": 1.0}}
-
     def moved(columns: Columns) -> None:
         columns["design.P"][0] = next_up(columns["design.P"][0])
 
@@ -183,7 +181,7 @@ def test_another_best_another_design_another_search_and_another_robot_are_caught
     def of(changes: dict[str, Change]) -> list[str]:
         return failed(gaitswarm.verify(tampered(proved.content, changes), replay=0))
 
-    assert of(changed("job.json", worse)) == ["best"]
+    assert of(changed("best.json", {"iteration": 0, "particle": 0})) == ["best"]
     assert of(changed("best.json", {"design": {"P": 0.0, "I": 0.0}})) == ["best"]
     assert of({EVALUATIONS: with_cells(moved)}) == ["designs", "chain"]
     assert of({ASKS: with_cells(asked)}) == ["designs", "search", "chain"]
@@ -191,7 +189,6 @@ def test_another_best_another_design_another_search_and_another_robot_are_caught
     assert of({"robots/0/robot.urdf": lambda urdf: urdf + b" "}) == ["robot"]
     toml = next(name for name in unzipped(proved.content) if name.endswith(".toml"))
     assert of({toml: lambda text: text + b"#"}) == ["robot"]
-    assert of(changed("job.json", {"name": "another"})) == ["contents"]
 
 
 def test_other_code_is_reported_and_equal_bits_verify_all_the_same(
@@ -205,8 +202,7 @@ def test_other_code_is_reported_and_equal_bits_verify_all_the_same(
     monkeypatch.setattr("gaitswarm.evidence.verify.job_provenance", other)
     found = gaitswarm.verify(proved.content, replay=2, seed=1)
     assert found.verified
-    assert found.provenance[0] == "from iteration 0 on: changed simulation code"
-    assert "physics and control loop are the same" in found.provenance[1]
+    assert found.provenance == ["from iteration 0 on: changed simulation code"]
 
 
 def test_a_search_in_single_precision_is_verified_with_its_best_in_double(tmp_path: Path) -> None:
@@ -252,7 +248,6 @@ def test_a_fuzzy_design_and_a_robot_of_ones_own_can_be_proved(tmp_path: Path) ->
         with gaitswarm.open(tmp_path / "jobs.db") as jobs:
             content = jobs.evidence(run.job.id)
         assert gaitswarm.verify(content, replay=2).verified
-    assert "figures/surface-FO.svg" in unzipped(content)
 
 
 def test_a_file_that_is_missing_and_a_negative_count_are_errors(tmp_path: Path) -> None:

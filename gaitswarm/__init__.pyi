@@ -52,7 +52,6 @@ from gaitswarm.services.optimizer.search.cma_es import CmaEsSettings
 from gaitswarm.services.optimizer.search.differential_evolution import DeSettings
 from gaitswarm.services.optimizer.search.hype import HypeSettings
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
 from gaitswarm.sim.calibration import Target, TargetWalk
 from gaitswarm.sim.controllers import CONTROLLERS
@@ -86,7 +85,7 @@ __all__ = [
     "IdentificationSpec", "ImportanceView", "Interrupted", "InvalidRequest", "IterationView",
     "JobComparisonView", "JobEnded", "JobEvent", "JobFilter", "JobSpec", "JobSummaryView",
     "JobView", "Jobs", "LeaseLost", "NotFound", "OptimizationResult", "Preference",
-    "PreferenceForView", "ProvenanceChanged", "PsoPsSettings", "PsoSettings", "QuotaExceeded",
+    "PreferenceForView", "ProvenanceChanged", "PsoSettings", "QuotaExceeded",
     "RandomSearchSettings", "RankingView", "RecordedWalk", "RobotFiles", "RobotVariant",
     "RobustPreferencesView", "RobustnessOptions", "RobustnessView", "Scenario",
     "ScenarioFamiliesView", "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",

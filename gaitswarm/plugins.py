@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
-from gaitswarm.services.optimizer.search.pattern_search import Polls, PollSettings, polls
+from gaitswarm.services.optimizer.search.pso import ParticleSwarm, SwarmSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import Method, create_search, from_generator
 from gaitswarm.services.optimizer.search.replayed import Proposals, Start
-from gaitswarm.services.optimizer.search.space import Axis, Judged, Space
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.case_registry import CaseFamily, CaseSettings
 from gaitswarm.sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, Response
@@ -45,7 +45,6 @@ __all__ = [
     "Controller",
     "FuzzyPi",
     "Inference",
-    "Judged",
     "Kernel",
     "LinkNoise",
     "LongCase",
@@ -54,8 +53,7 @@ __all__ = [
     "Objective",
     "Optimizer",
     "Outcome",
-    "PollSettings",
-    "Polls",
+    "ParticleSwarm",
     "Proposals",
     "RandomNumbers",
     "Response",
@@ -66,6 +64,7 @@ __all__ = [
     "Space",
     "Start",
     "Status",
+    "SwarmSettings",
     "TableAxis",
     "Variable",
     "Walk",
@@ -73,7 +72,6 @@ __all__ = [
     "from_generator",
     "integral_gain",
     "load_robot",
-    "polls",
     "required",
     "simulate_walk",
     "to_fixed",

@@ -28,8 +28,8 @@ class TestMethods(OptimizerContract):
             self.reloaded = 30
 
 
-def test_all_eleven_are_registered() -> None:
-    assert len(NAMES) == 11
+def test_all_twelve_are_registered() -> None:
+    assert len(NAMES) == 12
 
 
 @pytest.mark.parametrize("settings", ["no-such", {"name": "gsa", "gravity": -1.0}])

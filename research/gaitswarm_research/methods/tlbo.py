@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.plugins import (
-    Judged,
     Proposals,
     RandomNumbers,
     SearchSettings,
@@ -18,6 +17,7 @@ from gaitswarm.plugins import (
     Start,
     from_generator,
 )
+from gaitswarm_research.methods.judged import Judged
 
 Floats = NDArray[np.float64]
 

@@ -21,7 +21,6 @@ from gaitswarm.services.optimizer.search.differential_evolution import (
 from gaitswarm.services.optimizer.search.hype import Hype, HypeSettings
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
-from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings, pso_ps
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings, random_search
 from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed
 from gaitswarm.services.optimizer.search.space import Space
@@ -154,11 +153,6 @@ _BUILT_IN: Final[dict[str, Method]] = {
         ParticleSwarm,
         uses_start=True,
     ),
-    "pso-ps": from_generator(
-        PsoPsSettings,
-        "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
-        pso_ps,
-    ),
     "random": from_generator(
         RandomSearchSettings,
         "Uniform random designs: the baseline for other methods",
@@ -168,7 +162,7 @@ _BUILT_IN: Final[dict[str, Method]] = {
 
 _IN_RESEARCH: Final = (
     *("dts", "ga", "global-bfgs", "global-nelder-mead", "global-unirandi", "gsa", "mads"),
-    *("nelder-mead", "ps", "sa", "tlbo"),
+    *("nelder-mead", "ps", "pso-ps", "sa", "tlbo"),
 )
 """Methods of the package gaitswarm-research, in the folder research/."""
 
@@ -200,7 +194,6 @@ else:
         | CmaEsSettings
         | DeSettings
         | HypeSettings
-        | PsoPsSettings
         | PsoSettings
         | RandomSearchSettings,
         PluginSettings(METHODS, attrgetter("settings"), "/v1/optimizers"),

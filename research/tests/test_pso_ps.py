@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.search.pso import ParticleSwarm
-from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings, best_members, pso_ps
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.registry import create_search
-from gaitswarm.services.optimizer.search.replayed import Start
-from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.plugins import Axis, ParticleSwarm, RandomNumbers, Space, Start, create_search
+from gaitswarm_research.methods.pso_ps import PsoPsSettings, best_members, pso_ps
 
 Floats = NDArray[np.float64]
 

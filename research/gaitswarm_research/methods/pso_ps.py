@@ -8,11 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.search.pattern_search import Polls, PollSettings, polls
-from gaitswarm.services.optimizer.search.pso import ParticleSwarm, SwarmSettings
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.replayed import Proposals, Start
-from gaitswarm.services.optimizer.search.space import Judged, Space
+from gaitswarm.plugins import (
+    ParticleSwarm,
+    Proposals,
+    RandomNumbers,
+    Space,
+    Start,
+    SwarmSettings,
+    from_generator,
+)
+from gaitswarm_research.methods.judged import Judged
+from gaitswarm_research.methods.pattern_search import Polls, PollSettings, polls
 
 Floats = NDArray[np.float64]
 
@@ -114,3 +120,10 @@ def _next_poll(search: Polls, fitness: Floats) -> Floats | None:
         return search.send(fitness)
     except StopIteration:
         return None
+
+
+METHOD = from_generator(
+    PsoPsSettings,
+    "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
+    pso_ps,
+)

@@ -46,13 +46,12 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from gaitswarm.services.optimizer.run.outage import Backoff
-from gaitswarm.services.optimizer.search.automatic import AutoSettings
 from gaitswarm.services.optimizer.search.bayesian import BayesianSettings
 from gaitswarm.services.optimizer.search.cma_es import CmaEsSettings
 from gaitswarm.services.optimizer.search.differential_evolution import DeSettings
 from gaitswarm.services.optimizer.search.hype import HypeSettings
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.registry import AutoSettings, RandomSearchSettings
 from gaitswarm.sim.calibration import Target, TargetWalk
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.identification import RecordedWalk

@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
 from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceName
 from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
-from gaitswarm.services.optimizer.search.automatic import ChoiceName, ChosenSettings
+from gaitswarm.services.optimizer.search.registry import OptimizerName, OptimizerSettings
 from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.kernel.walk import Precision
@@ -91,7 +91,7 @@ class SpecOptions(TypedDict, total=False):
     variables: Sequence[str | Variable | Document]
     fixed: Mapping[str, float | str]
     preference: PreferenceInput
-    optimizer: ChoiceName | ChosenSettings | Document
+    optimizer: OptimizerName | OptimizerSettings | Document
     particles: int
     iterations: int
     seed: int
@@ -120,7 +120,7 @@ class ForkOptions(TypedDict, total=False):
 
     name: str
     preference: PreferenceInput
-    optimizer: ChoiceName | ChosenSettings | Document
+    optimizer: OptimizerName | OptimizerSettings | Document
     particles: int
     scenarios: ScenarioInput | Iterable[ScenarioInput]
     robot: RobotInput

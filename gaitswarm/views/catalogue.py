@@ -7,13 +7,12 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 from pydantic import ConfigDict, Field
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
-from gaitswarm.services.optimizer.search.automatic import (
-    AUTO_SUMMARY,
-    CHOICES,
-    ChoiceName,
-    ChosenSettings,
+from gaitswarm.services.optimizer.search.registry import (
+    METHODS,
+    OPTIMIZERS,
+    OptimizerName,
+    OptimizerSettings,
 )
-from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.services.optimizer.views import View, listing_name
 from gaitswarm.sim.case_registry import CASES
 from gaitswarm.sim.catalogue import design_shown
@@ -117,8 +116,10 @@ class CaseView(View):
 class OptimizerView(CaseView):
     """A search method by its default settings, or a preset of one."""
 
-    name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-falling-inertia"])
-    settings: ChosenSettings = Field(description="What the name stands for.")
+    name: OptimizerName = Field(
+        description="Name, as in job specs.", examples=["pso-falling-inertia"]
+    )
+    settings: OptimizerSettings = Field(description="What the name stands for.")
 
 
 class PluginView(View):
@@ -167,11 +168,13 @@ def optimizer_views() -> list[OptimizerView]:
     return [
         OptimizerView(
             name=name,
-            **_of_method(settings),
+            description=method.summary,
+            needs=method.remedy if method.missing else None,
             settings=settings,
-            settings_schema=type(settings).model_json_schema(),
+            settings_schema=method.settings.model_json_schema(),
         )
-        for name, settings in CHOICES.items()
+        for name, settings in OPTIMIZERS.items()
+        for method in (METHODS[settings.name],)
     ]
 
 
@@ -204,13 +207,6 @@ def plugin_views() -> list[PluginView]:
         for plugin in registry.plugins()
         for reason in (registry.problem(plugin),)
     ]
-
-
-def _of_method(settings: ChosenSettings) -> dict[str, Any]:
-    if settings.name == "auto":
-        return {"description": AUTO_SUMMARY, "needs": None}
-    method = METHODS[settings.name]
-    return {"description": method.summary, "needs": method.remedy if method.missing else None}
 
 
 def controller_views() -> list[ControllerView]:

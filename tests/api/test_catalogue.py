@@ -10,8 +10,7 @@ import jsonschema
 import pytest
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.services.optimizer.search.automatic import CHOICES
-from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.gait_variables import GAIT_VARIABLES
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
@@ -65,7 +64,7 @@ def test_preferences_have_their_biases_and_exponents(client: httpx2.Client) -> N
 def test_optimizers_have_their_settings(client: httpx2.Client) -> None:
     found = {item["name"]: item for item in items(client, "optimizers")}
 
-    assert list(found) == list(CHOICES)
+    assert list(found) == list(OPTIMIZERS)
     swarms = {name: found[name]["settings"] for name in ("pso", "pso-falling-inertia")}
     assert {name: (s["inertia_start"], s["inertia_end"]) for name, s in swarms.items()} == {
         "pso": (0.9, 0.9),

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from gaitswarm.services.optimizer.search.automatic import CHOICES
+from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.uneven import UNEVEN_SPEC, uneven_iterations
 
@@ -23,13 +23,13 @@ def submitted(gaitswarm: Gaitswarm, db: Path, *options: object) -> Any:
 
 def test_all_methods_are_listed_with_the_schema_of_their_settings(gaitswarm: Gaitswarm) -> None:
     found = gaitswarm("optimizers", "--json").json
-    assert [item["name"] for item in found] == list(CHOICES)
+    assert [item["name"] for item in found] == list(OPTIMIZERS)
     for item in found:
         jsonschema.validate(item["settings"], item["settings_schema"])
         described = item["settings_schema"]["properties"]
         assert all("description" in field for name, field in described.items() if name != "name")
     table = gaitswarm("optimizers").out
-    assert all(name in table for name in CHOICES)
+    assert all(name in table for name in OPTIMIZERS)
     assert "inertia_end 0.9" in table
 
 

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.search.enumeration import Enumeration
+from gaitswarm.services.optimizer.jobs.kinds.certificate import Enumeration
 
 
 def numbers(start: int, stop: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.jobs.kinds.identification import Identificatio
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
 from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.walk import Walking
 from gaitswarm.sim.robot import RobotVariant

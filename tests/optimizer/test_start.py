@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.search.hype import Hype
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.registry import METHODS, MethodName, create_search
+from gaitswarm.services.optimizer.search.registry import (
+    METHODS,
+    RandomSearchSettings,
+    create_search,
+)
 from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed, Start
 from gaitswarm.services.optimizer.search.space import Axis, Space
 
@@ -30,7 +33,7 @@ METHOD = pytest.mark.parametrize("method", list(METHODS.built_in))
 STARTS = pytest.mark.parametrize("start", [GOOD, MANY], ids=["few", "more than an iteration"])
 
 
-def search(method: MethodName, start: Floats | None, *, budget: int = BUDGET) -> Optimizer:
+def search(method: str, start: Floats | None, *, budget: int = BUDGET) -> Optimizer:
     settings = METHODS[method].settings.model_validate({"name": method, "particles": PARTICLES})
     return create_search(settings, SPACE, budget, SEED, start)
 
@@ -65,9 +68,7 @@ def bits(positions: Iterator[Floats]) -> list[bytes]:
 
 @METHOD
 @STARTS
-def test_the_start_is_asked_for_first_and_counts_as_budget(
-    method: MethodName, start: Floats
-) -> None:
+def test_the_start_is_asked_for_first_and_counts_as_budget(method: str, start: Floats) -> None:
     optimizer = search(method, start)
     found = bits(path(optimizer))
     assert found[: len(start)] == [row.tobytes() for row in start]
@@ -77,9 +78,7 @@ def test_the_start_is_asked_for_first_and_counts_as_budget(
 @pytest.mark.variants(without="*-bayesian")
 @METHOD
 @STARTS
-def test_a_started_search_resumes_to_the_bit_after_every_tell(
-    method: MethodName, start: Floats
-) -> None:
+def test_a_started_search_resumes_to_the_bit_after_every_tell(method: str, start: Floats) -> None:
     # Every load repeats all models of before, which takes seconds.
     last = 20 if method == "bayesian" else BUDGET
     straight = bits(path(search(method, start), evaluations=last))
@@ -104,7 +103,7 @@ def test_a_started_search_resumes_to_the_bit_after_every_tell(
 
 @pytest.mark.variants(without="bayesian")
 @METHOD
-def test_a_method_learns_from_the_start_if_it_says_so(method: MethodName) -> None:
+def test_a_method_learns_from_the_start_if_it_says_so(method: str) -> None:
     started = bits(path(search(method, GOOD)))[len(GOOD) :]
     left = BUDGET - len(GOOD)
     cold = bits(path(search(method, None, budget=left), evaluations=left))
@@ -112,7 +111,7 @@ def test_a_method_learns_from_the_start_if_it_says_so(method: MethodName) -> Non
 
 
 @METHOD
-def test_a_start_outside_the_bounds_or_too_late_is_refused(method: MethodName) -> None:
+def test_a_start_outside_the_bounds_or_too_late_is_refused(method: str) -> None:
     with pytest.raises(ValueError, match="outside the bounds"):
         search(method, GOOD + 10.0)
     with pytest.raises(ValueError, match="shape"):
@@ -125,7 +124,7 @@ def test_a_start_outside_the_bounds_or_too_late_is_refused(method: MethodName) -
 
 @pytest.mark.variants(without="bayesian")
 @METHOD
-def test_without_a_start_the_search_is_unchanged(method: MethodName) -> None:
+def test_without_a_start_the_search_is_unchanged(method: str) -> None:
     none = np.empty((0, SPACE.dimension))
     assert bits(path(search(method, none))) == bits(path(search(method, None)))
 

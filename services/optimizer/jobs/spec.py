@@ -23,14 +23,15 @@ from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import Judgement, by_design
-from gaitswarm.services.optimizer.search.automatic import AutoSettings, chosen_method
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
     OPTIMIZERS,
+    AutoSettings,
     OptimizerSettings,
+    chosen_method,
     create_search,
 )
 from gaitswarm.sim.assembly import check_precision
@@ -190,13 +191,13 @@ class Spec(BaseModel):
     def search(self) -> OptimizerSettings:
         """Settings of the search method; for `auto`, of the method that it selects."""
         if isinstance(self.optimizer, AutoSettings):
-            return chosen_method(self.optimizer, self.design_space().box, self.budget)
+            return chosen_method(self.optimizer, self.design_space().box)
         return self.optimizer
 
     @model_validator(mode="after")
     def _can_be_resumed(self) -> Self:
         name = self.optimizer.name
-        if name != "auto" and METHODS[name].replays and self.budget > LONGEST_REPLAY:
+        if METHODS[name].replays and self.budget > LONGEST_REPLAY:
             raise ValueError(
                 f"iterations: {name} is replayed when a job is resumed, so it"
                 f" evaluates {LONGEST_REPLAY} designs at most, not {self.budget}"
@@ -206,7 +207,7 @@ class Spec(BaseModel):
     @model_validator(mode="after")
     def _has_objectives_for_method(self) -> Self:
         name = self.optimizer.name
-        if name != "auto" and METHODS[name].multi_objective and not self.has_objective_vectors:
+        if METHODS[name].multi_objective and not self.has_objective_vectors:
             raise ValueError(
                 f"optimizer: {name} is multi-objective, and designs of this kind of job have no"
                 " separate objectives; choose another method"

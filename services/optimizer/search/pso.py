@@ -88,7 +88,8 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
 
     It moves in the continuous box, in the variables' own units. Positions stay real in integer
     variables, so that a particle keeps its velocity while it crosses the width of an integer. A
-    velocity is the change of position in one iteration.
+    velocity is the change of position in one iteration. For `rejudge`, `generations` is the list
+    of all positions with their fitness, as in `Rejudging`.
     """
 
     state_model = _SwarmState

@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias, Union
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Discriminator, Tag
 
 from gaitswarm.services.optimizer.search.bayesian import BayesianSettings, bayesian
 from gaitswarm.services.optimizer.search.cma_es import CmaEs, CmaEsSettings
@@ -21,7 +21,7 @@ from gaitswarm.services.optimizer.search.differential_evolution import (
 from gaitswarm.services.optimizer.search.hype import Hype, HypeSettings
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
-from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings, random_search
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.plugins import (
@@ -118,7 +118,52 @@ def from_generator(
 LONGEST_REPLAY: Final = 250_000
 """Largest budget [evaluations] of a job whose search is replayed when it resumes."""
 
+
+class AutoSettings(SearchSettings):
+    """Settings that are replaced by those of a method when the job is submitted."""
+
+    name: Literal["auto"] = "auto"
+
+
+_LARGEST_DIMENSION: Final = 64
+"""Variables up to which CMA-ES is chosen; its decomposition costs the cube of the dimension."""
+
+
+def chosen_method(settings: AutoSettings, space: Space) -> SearchSettings:
+    """Choose the method of a search."""
+    chosen = CmaEsSettings if space.dimension <= _LARGEST_DIMENSION else DeSettings
+    return chosen(particles=settings.particles)
+
+
+def _create_chosen(settings: AutoSettings, space: Space, budget: int, seed: int) -> Optimizer:
+    return create_search(chosen_method(settings, space), space, budget, seed)
+
+
+class RandomSearchSettings(SearchSettings):
+    """Settings of random search."""
+
+    name: Literal["random"] = "random"
+
+
+def random_search(
+    settings: RandomSearchSettings,
+    space: Space,
+    budget: int,  # noqa: ARG001 - the same for every budget
+    random: RandomNumbers,
+) -> Proposals:
+    """Sample designs uniformly in the box, all integers and choices with equal probability."""
+    while True:
+        unit = random.uniform(settings.particles, space.dimension)
+        yield space.evenly(unit)
+
+
 _BUILT_IN: Final[dict[str, Method]] = {
+    "auto": Method(
+        AutoSettings,
+        "CMA-ES, or differential evolution for more than 64 variables; chosen on submission",
+        _create_chosen,
+        uses_start=True,
+    ),
     "bayesian": from_generator(
         BayesianSettings,
         "Gaussian process with batches, in a trust region (scikit-learn; TuRBO, Eriksson 2019)",
@@ -184,18 +229,24 @@ METHODS: Final = Registry[Method](
 )
 """Methods by name, those of plug-ins included."""
 
-MethodName: TypeAlias = Annotated[str, KnownName(METHODS)]
+
+def _tag(settings: Any) -> str | None:
+    if isinstance(settings, BaseModel):
+        return f"<{getattr(settings, 'name', '')}>"
+    return f"<{settings.get('name')}>" if isinstance(settings, Mapping) else None
+
 
 if TYPE_CHECKING:
     OptimizerSettings: TypeAlias = SearchSettings
 else:
+    # Tags in angle brackets are omitted from the locations that errors name.
     OptimizerSettings = Annotated[
-        BayesianSettings
-        | CmaEsSettings
-        | DeSettings
-        | HypeSettings
-        | PsoSettings
-        | RandomSearchSettings,
+        Union[tuple(Annotated[m.settings, Tag(f"<{name}>")] for name, m in _BUILT_IN.items())],  # noqa: UP007 - of a tuple
+        Discriminator(
+            _tag,
+            custom_error_type="no_choice",
+            custom_error_message="must be a name or an object with settings",
+        ),
         PluginSettings(METHODS, attrgetter("settings"), "/v1/optimizers"),
     ]
     """Settings of any method, distinguished by their `name`."""
@@ -216,14 +267,13 @@ _PRESETS: Final[dict[str, SearchSettings]] = {
 
 
 class NamedSettings(Mapping[str, SearchSettings]):
-    """Default settings of every method and presets, by name."""
+    """Default settings of every method, and presets of `pso`, by name.
 
-    def __init__(self, first: Mapping[str, SearchSettings] = MappingProxyType({})) -> None:
-        self._first = first
+    `pso` is the thesis's swarm, whose inertia is constant. `pso-constriction` has the coefficients
+    of Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (2007).
+    """
 
     def __getitem__(self, name: str) -> SearchSettings:
-        if name in self._first:
-            return self._first[name]
         return _PRESETS[name] if name in _PRESETS else METHODS[name].settings()  # type: ignore[call-arg]
 
     def __iter__(self) -> Iterator[str]:
@@ -231,12 +281,12 @@ class NamedSettings(Mapping[str, SearchSettings]):
         yield from (name for name in METHODS if name not in METHODS.built_in)
 
     def __len__(self) -> int:
-        return sum(1 for _ in self)
+        return len(METHODS) + len(_PRESETS)
 
     @property
     def built_in(self) -> tuple[str, ...]:
         """Names of gaitswarm's own methods and presets."""
-        return (*self._first, *sorted({*METHODS.built_in, *_PRESETS}))
+        return tuple(sorted({*METHODS.built_in, *_PRESETS}))
 
     def unknown(self, name: str) -> str:
         """Explain that a name is unknown."""
@@ -244,11 +294,8 @@ class NamedSettings(Mapping[str, SearchSettings]):
 
 
 OPTIMIZERS: Final = NamedSettings()
-"""Default settings by method, and presets of `pso`.
 
-`pso` is the thesis's swarm, whose inertia is constant. `pso-constriction` has the coefficients of
-Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (2007).
-"""
+OptimizerName: TypeAlias = Annotated[str, KnownName(OPTIMIZERS)]
 
 
 def create_search(

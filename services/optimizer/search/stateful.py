@@ -189,6 +189,8 @@ class Generational(Stateful[G], Generic[S, G]):
 
     Start positions replace the first members of the first generation. If there are more start
     positions than members, all are evaluated, and the best become the generation.
+
+    In the methods `positions` is (n, d), `fitness` is (n,) and `count` is a number of positions.
     """
 
     space: Space

@@ -16,9 +16,9 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.jobs.spec import requested
-from gaitswarm.services.optimizer.search.enumeration import Enumeration
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
-from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
+from gaitswarm.services.optimizer.search.stateful import CountedState, Stateful
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -163,6 +163,32 @@ def world_positions(
         return worlds[start:]
 
     return positions
+
+
+class Enumeration(Stateful[CountedState]):
+    """An optimizer that ignores its feedback: position k is a function of k."""
+
+    def __init__(self, name: str, particles: int, positions: Callable[[int, int], Floats]) -> None:
+        state = CountedState(optimizer=name, schema_version=1, iteration=0, asked=0, evaluations=0)
+        super().__init__(particles, state)
+        self._positions = positions
+
+    @property
+    def evaluations(self) -> int:
+        return self.state.evaluations
+
+    def start_from(self, positions: Floats) -> None:
+        if len(positions):
+            raise ValueError(
+                f"start_from(): {self.state.optimizer} does not accept start positions"
+            )
+
+    def _waiting(self) -> Floats:
+        first = self.state.evaluations
+        return self._positions(first, first + (self.state.asked or self._particles))
+
+    def _answer(self, fitness: Floats) -> None:
+        self.state.evaluations += len(fitness)
 
 
 BATCH: Final = 50

@@ -43,7 +43,6 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.services.optimizer.search.bayesian import BayesianSettings
@@ -82,7 +81,7 @@ __all__ = [
     "FirmwareOptions", "FirmwareView", "Forbidden", "FrontView", "GaitswarmError",
     "HistoryIterationView", "HypeSettings", "IdempotencyConflict", "IdentifiabilityView",
     "IdentificationSpec", "ImportanceView", "Interrupted", "InvalidRequest", "IterationView",
-    "JobComparisonView", "JobEnded", "JobEvent", "JobFilter", "JobSpec", "JobSummaryView",
+    "JobComparisonView", "JobEnded", "JobEvent", "JobSpec", "JobSummaryView",
     "JobView", "Jobs", "LeaseLost", "NotFound", "OptimizationResult", "Preference",
     "PreferenceForView", "ProvenanceChanged", "PsoSettings", "QuotaExceeded",
     "RandomSearchSettings", "RankingView", "RecordedWalk", "RobotFiles", "RobotVariant",

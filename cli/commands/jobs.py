@@ -109,12 +109,10 @@ def list_jobs(
 ) -> Printed:
     """List jobs, newest first by default."""
     from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
-    from gaitswarm.services.optimizer.jobs.labels import JobFilter
 
     if everything and archived is not None:
         raise InvalidRequest("--all and --archived are mutually exclusive", field="all")
     hidden = None if everything else bool(archived)
-    where = JobFilter(hidden, robot, controller, preference, tag)
     job_state = None if state is None else one_of(JobState, state, "state")
     job_order = one_of(JobOrder, order, "order")
 
@@ -123,7 +121,11 @@ def list_jobs(
             state=job_state,
             parent=forks_of,
             search=search,
-            where=where,
+            archived=hidden,
+            robot=robot,
+            controller=controller,
+            preference=preference,
+            tag=tag,
             order=job_order,
             reverse=reverse,
             limit=most,
@@ -421,5 +423,5 @@ def keep(
     jobs: Jobs,
 ) -> Printed:
     """Protect a job from deletion."""
-    job = jobs.keep(job_id, kept=not release)
+    job = jobs.release(job_id) if release else jobs.keep(job_id)
     return job, f"job {job.id} {'is kept' if job.kept else 'is no longer kept'}"

@@ -89,6 +89,7 @@ class AsyncJobs:
     prioritize = _awaited(Jobs.prioritize)
     label = _awaited(Jobs.label)
     keep = _awaited(Jobs.keep)
+    release = _awaited(Jobs.release)
     delete = _awaited(Jobs.delete)
     best = _awaited(Jobs.best)
     iterations = _iterated(Jobs.iterations)

@@ -6,11 +6,22 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
-from functools import partial
+from functools import partial, wraps
 from itertools import islice
 from types import TracebackType
-from typing import Annotated, Any, Final, Self, TypeAlias, TypeVar, Unpack
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Concatenate,
+    Final,
+    ParamSpec,
+    Self,
+    TypeAlias,
+    TypeVar,
+    Unpack,
+    cast,
+)
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
@@ -94,7 +105,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter, LabelsChange
+from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
@@ -124,8 +135,16 @@ from gaitswarm.views.job import (
 from gaitswarm.views.verification import Digest, HistoryVerificationView
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 
+P = ParamSpec("P")
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
+
+if TYPE_CHECKING:
+    StateName = JobState | str
+    OrderName = JobOrder | str
+else:
+    # Validation makes enumerators of names.
+    StateName, OrderName = JobState, JobOrder
 
 PAGE: Final = 100
 """Items that are read at once."""
@@ -197,15 +216,37 @@ class Stop:
             self._wake = None
 
 
+def items(
+    method: Callable[Concatenate[Any, P], PageView[V]],
+) -> Callable[Concatenate[Any, P], Iterator[V]]:
+    """Make an iterator of a method that returns a page: over all items, or the first `limit`."""
+
+    @wraps(method)
+    def iterate(self: Any, /, *arguments: P.args, **options: P.kwargs) -> Iterator[V]:
+        given: dict[str, Any] = {"after": None, **options}
+        return islice(pages(partial(method, self, *arguments), given), given.pop("limit", None))
+
+    def pages(page: Callable[..., PageView[V]], given: dict[str, Any]) -> Iterator[V]:
+        while True:
+            read = page(**given, limit=PAGE)
+            yield from read.items
+            if read.next is None:
+                return
+            given["after"] = read.next
+
+    return iterate
+
+
 class Jobs(ABC):
     """Jobs, in a database (`gaitswarm.open`) or behind a server (`gaitswarm.connect`).
 
     Both return the same results and raise the same errors: every method raises Unavailable if the
-    database or the server cannot be reached, and methods that take an id raise NotFound for an
-    unknown one. `job_id` is the identifier of a job. Commands return the job as it is then.
-    Analyses raise InvalidRequest for a job of another kind, and Conflict for one that is too large
-    to be held in memory. Iterators read as they are consumed, so that a long history is never held
-    in memory. Thread-safe. A context manager: leaving the block closes it.
+    database or the server cannot be reached, InvalidRequest for an invalid argument, which it
+    names, and NotFound for an unknown id. `job_id` is the identifier of a job, and
+    `after` is where a list continues. Commands return the job as it is then. Analyses raise
+    InvalidRequest for a job of another kind, and Conflict for one that is too large to be held in
+    memory. Iterators read pages as they are consumed, up to `limit` items, by default all.
+    Thread-safe. A context manager: leaving the block closes it.
     """
 
     _service: JobService
@@ -269,8 +310,6 @@ class Jobs(ABC):
             The queued job, or the one that the key created before.
 
         Raises:
-            InvalidRequest: The job is invalid or cannot be simulated, or the server does not send
-                to that URL; names the field.
             IdempotencyConflict: The key was used before for another job.
         """
         chosen = chosen_spec(spec, options)
@@ -295,7 +334,6 @@ class Jobs(ABC):
         search starts from the parent's best designs. The fork's `lineage` says which.
 
         Args:
-            job_id: Identifier of the parent, which does not change.
             from_iteration: First iteration that the fork computes itself, from 0; it takes over
                 those before.
             idempotency_key: Any text. The same key and fork again create no second job.
@@ -307,7 +345,6 @@ class Jobs(ABC):
             The queued fork.
 
         Raises:
-            InvalidRequest: The fork is invalid or cannot be simulated; names the field.
             ProvenanceChanged: The provenance has changed since, which is not accepted.
             Conflict: The parent's search cannot be continued, or has no design to start from.
             IdempotencyConflict: The key was used before for another job.
@@ -316,76 +353,32 @@ class Jobs(ABC):
         given = {"idempotency_key": idempotency_key, "priority": priority, "notify_url": notify_url}
         return self._fork(job_id, request, checked(Submission, given))
 
+    @analysis("POST /estimates", "estimate_job", "Estimate a job", body=AnySpec)
     def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
     ) -> EstimateView:
-        """Estimate the cost of a job; nothing is stored.
-
-        Args:
-            spec: As for `submit`.
-            **options: As for `submit`.
-
-        Returns:
-            Simulations, simulated time and computing time.
-
-        Raises:
-            InvalidRequest: As `submit`.
-        """
-        return self._estimate(chosen_spec(spec, options))
-
-    @analysis("POST /estimates", "estimate_job", "Estimate a job")
-    def _estimate(self, spec: AnySpec) -> EstimateView:
         """Check a job as on submission, and estimate its cost. Nothing is stored.
 
         The time follows from the rate of earlier jobs with the same robot and controller; if there
         are none, a short simulation is timed on the server, which may have to compile the robot's
         kernel.
-        """
-        return EstimateView.model_validate(self._service.estimate(spec))
 
+        Args:
+            spec: As for `submit`.
+            **options: As for `submit`.
+        """
+        return EstimateView.model_validate(self._service.estimate(chosen_spec(spec, options)))
+
+    @items
+    @core("GET /jobs", "list_jobs", "List jobs")
     def jobs(
         self,
         *,
-        state: JobState | str | None = None,
-        parent: str | None = None,
-        search: str = "",
-        where: JobFilter = ANY_JOB,
-        order: JobOrder | str = JobOrder.CREATED,
-        reverse: bool = False,
-        limit: int | None = None,
-    ) -> Iterator[JobSummaryView]:
-        """List jobs.
-
-        Args:
-            state: Only jobs in this state, such as "running".
-            parent: Only forks of the job of this id.
-            search: Only jobs whose name, id, note or tags contain this, ignoring case.
-            where: Further criteria, such as `JobFilter(controller="pi")`.
-            order: "created" (newest first), "fitness" (best first), "gain" over the published
-                design (largest first), "name", "state", "iterations", "evaluations", "priority",
-                "rate" (largest first) or "time_left" (shortest first).
-            reverse: Whether to reverse the order; jobs without the value still come last.
-            limit: Maximum number of jobs; None for all.
-
-        Returns:
-            The jobs with their progress, in order.
-
-        Raises:
-            InvalidRequest: No such state or order.
-        """
-        query: dict[str, Any] = {"state": state, "order": order, **asdict(where)}
-        page = partial(self._job_page, parent=parent, search=search, reverse=reverse, **query)
-        return islice(_items(page), limit)
-
-    @core("GET /jobs", "list_jobs", "List jobs")
-    def _job_page(
-        self,
-        *,
-        state: JobState | None = None,
+        state: StateName | None = None,
         kind: JobKind | None = None,
         parent: JobIdText | None = None,
         search: SearchText = "",
-        order: JobOrder = JobOrder.CREATED,
+        order: OrderName = JobOrder.CREATED,
         reverse: bool = False,
         robot: SearchText | None = None,
         controller: SearchText | None = None,
@@ -415,7 +408,7 @@ class Jobs(ABC):
             limit: Maximum number of jobs.
         """
         page = self._service.store.jobs(
-            state=state,
+            state=cast(JobState | None, state),
             kind=kind,
             parent=parent,
             search=search,
@@ -426,7 +419,7 @@ class Jobs(ABC):
                 preference=preference,
                 tag=tag,
             ),
-            order=order,
+            order=cast(JobOrder, order),
             reverse=reverse,
             after=after,
             limit=limit,
@@ -516,7 +509,6 @@ class Jobs(ABC):
 
         Raises:
             Conflict: It was cancelled.
-            InvalidRequest: The budget is spent already, or too large.
         """
         actor, quota = self._context.actor, self._context.quota
         job = self._service.extend(job_id, iterations, actor=actor, quota=quota)
@@ -546,7 +538,6 @@ class Jobs(ABC):
 
         Raises:
             Conflict: It has ended.
-            InvalidRequest: The priority is out of bounds.
         """
         self._context.check_priority(priority)
         actor = self._context.actor
@@ -578,27 +569,16 @@ class Jobs(ABC):
             note: Free text.
             tags: Words to find the job by, in place of the previous ones.
             archived: Whether lists hide the job by default.
-
-        Raises:
-            InvalidRequest: A label is too long; names it.
         """
         words = None if tags is None else tuple(tags)
         change = LabelsChange(name=name, note=note, tags=words, archived=archived)
         actor = self._context.actor
         return job_view(self._service, self._service.store.label(job_id, change, actor=actor))
 
-    def keep(self, job_id: str, *, kept: bool = True) -> JobView:
-        """Protect a job from deletion, or release it.
-
-        Args:
-            kept: Whether it is protected.
-        """
-        return self._keep(job_id) if kept else self._release(job_id)
-
     @operations(
         "PUT /jobs/{job_id}/keep", "keep_job", "Protect a job from deletion", access="command"
     )
-    def _keep(self, job_id: str) -> JobView:
+    def keep(self, job_id: str) -> JobView:
         """Protect a job from deletion by users and by retention."""
         actor = self._context.actor
         return job_view(self._service, self._service.store.keep(job_id, kept=True, actor=actor))
@@ -606,7 +586,7 @@ class Jobs(ABC):
     @operations(
         "DELETE /jobs/{job_id}/keep", "release_job", "End the protection of a job", access="command"
     )
-    def _release(self, job_id: str) -> JobView:
+    def release(self, job_id: str) -> JobView:
         """Allow deletion; a server with a retention time deletes the job when that has passed."""
         actor = self._context.actor
         return job_view(self._service, self._service.store.keep(job_id, kept=False, actor=actor))
@@ -665,19 +645,9 @@ class Jobs(ABC):
             )
         return BestView.from_evaluation(best, job.spec)
 
-    def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
-        """List the committed iterations of a job.
-
-        Args:
-            after: Only iterations with a greater index.
-
-        Returns:
-            Fitness of the designs by iteration, in order.
-        """
-        return _items(partial(self._iteration_page, job_id), after=after)
-
+    @items
     @core("GET /jobs/{job_id}/iterations", "list_iterations", "List committed iterations")
-    def _iteration_page(
+    def iterations(
         self,
         job_id: str,
         *,
@@ -729,7 +699,7 @@ class Jobs(ABC):
         """
         spec = self.job(job_id).spec
         read = partial(EvaluationTable.from_parquet, spec)
-        return self._decoded(read, b"".join(self.export(job_id)))
+        return self._decoded(read, b"".join(self.export(job_id, "parquet")))
 
     @analysis(
         "POST /jobs/{job_id}/ranking",
@@ -741,16 +711,12 @@ class Jobs(ABC):
         """Rank all designs of a job under another preference; nothing is simulated.
 
         Args:
-            job_id: Identifier of a job that tunes a drive.
             preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
                 `Preference`.
             top: How many of the best designs to list, 1 to 1000.
 
         Returns:
             The best designs with their previous ranks, and how far the rankings agree.
-
-        Raises:
-            InvalidRequest: An argument is invalid.
         """
         job = self._service.job(job_id)
         if not isinstance(job.spec, JobSpec):
@@ -774,14 +740,12 @@ class Jobs(ABC):
         """Determine which scenarios of a job matter, from stored objectives.
 
         Args:
-            job_id: Identifier of a job that tunes a drive.
             tolerance: Largest regret of the smallest family of scenarios, as a share.
 
         Returns:
             The best designs that the job would have had without each scenario, and with few.
 
         Raises:
-            InvalidRequest: The tolerance is invalid.
             Conflict: No design of it succeeds in all scenarios.
         """
         spec, columns = self._tuning(job_id, "scenarios")
@@ -800,9 +764,6 @@ class Jobs(ABC):
     def failures(self, job_id: str) -> FailuresView:
         """Count the failed designs of a job by case and status, from stored statuses.
 
-        Args:
-            job_id: Identifier of a job of any kind.
-
         Returns:
             Cases with failures, most failures first; each status with its latest design.
         """
@@ -812,9 +773,6 @@ class Jobs(ABC):
     @analysis("GET /jobs/{job_id}/importance", "get_importance", "Get the importance of variables")
     def importance(self, job_id: str) -> ImportanceView:
         """Determine which variables of a job matter, from stored objectives.
-
-        Args:
-            job_id: Identifier of a job that tunes a drive or fits parameters.
 
         Returns:
             First-order Sobol' indices of every variable for the fitness, for each objective and for
@@ -851,9 +809,6 @@ class Jobs(ABC):
         Returns:
             Their convergence by iterations, evaluations and time, the distribution of fitness of
             their designs, and how their specs differ.
-
-        Raises:
-            InvalidRequest: There are none, too many, or one is named twice.
         """
         if len(set(job_ids)) < len(job_ids):
             raise InvalidRequest("must name each job once", field="job_ids")
@@ -886,7 +841,6 @@ class Jobs(ABC):
         The winners' robustness index is estimated on request, by simulations where the jobs are.
 
         Args:
-            job_id: Identifier of a job that tunes a drive.
             drawn: Preferences to draw in addition to A, B and C (table 4.5), 1 to 100000.
             candidates: Winners to list: those of A, B and C, and of the others those that win under
                 most preferences.
@@ -899,7 +853,6 @@ class Jobs(ABC):
             The candidates, the most robust first; without simulations those of most preferences.
 
         Raises:
-            InvalidRequest: An argument is invalid, or it takes more than the server allows.
             Conflict: No design of it succeeds in all scenarios.
         """
         request = PreferencesRequest(
@@ -926,7 +879,6 @@ class Jobs(ABC):
         """Find the Pareto front of a job over f1 to f5, from stored objectives.
 
         Args:
-            job_id: Identifier of a job that tunes a drive.
             most: Maximum number of designs to list, 1 to 10 000; of more, marked designs and others
                 that cover the front evenly.
 
@@ -934,7 +886,6 @@ class Jobs(ABC):
             The front with its knees, extremes and winners, and its hypervolume by iteration.
 
         Raises:
-            InvalidRequest: The number is invalid.
             Conflict: No design of it succeeds in all scenarios.
         """
         spec, columns = self._tuning(job_id, "objectives to trade")
@@ -949,7 +900,6 @@ class Jobs(ABC):
         """Find the preference under which a design wins its job, from stored objectives.
 
         Args:
-            job_id: Identifier of a job that tunes a drive.
             iteration: Iteration of the design, from 0.
             particle: Number of the design in its iteration, from 0.
 
@@ -957,7 +907,6 @@ class Jobs(ABC):
             The best preference for each set of biases, with the design's rank under it.
 
         Raises:
-            InvalidRequest: A number is invalid.
             NotFound: The job has no such design.
             Conflict: The design fails in a scenario.
         """
@@ -987,7 +936,6 @@ class Jobs(ABC):
             Intervals of every variable among designs within twelve thresholds of the best.
 
         Raises:
-            InvalidRequest: The jobs are of different problems, or have one seed.
             Conflict: One of them has no feasible design yet.
         """
         jobs = [self._service.job(job_id) for job_id in job_ids]
@@ -1013,7 +961,6 @@ class Jobs(ABC):
             The values of every target for the best design of all runs, and the predictions.
 
         Raises:
-            InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
             Conflict: One of them has no feasible design yet.
         """
         jobs = [self._service.job(job_id) for job_id in job_ids]
@@ -1048,7 +995,6 @@ class Jobs(ABC):
         The `replay` of a world is a command; its `values` are the `world` of POST /v1/replays.
 
         Args:
-            job_id: Identifier of a certificate.
             worlds: Number of worlds, from the first; by default all that were simulated.
             most: Number of worst worlds to list, 0 to 1000.
 
@@ -1056,7 +1002,6 @@ class Jobs(ABC):
             Failure rates, spreads by scenario, the worst worlds, and what correlates with them.
 
         Raises:
-            InvalidRequest: An argument is invalid.
             Conflict: No world was simulated yet.
         """
         job = self._service.job(job_id)
@@ -1068,23 +1013,6 @@ class Jobs(ABC):
         columns = self._service.columns(job)
         return certificate(job_id, job.spec, columns, worlds=worlds, most=most)
 
-    def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
-        """Write every evaluation of a job as a file.
-
-        Args:
-            file_format: "parquet" or "csv".
-
-        Returns:
-            The parts of the file, in order.
-
-        Raises:
-            InvalidRequest: No such format.
-        """
-        if file_format not in MEDIA_TYPES:
-            formats = " or ".join(MEDIA_TYPES)
-            raise InvalidRequest(f"must be {formats}, it is {file_format!r}", field="file_format")
-        return self._table(job_id, format=file_format)
-
     @analysis(
         "GET /jobs/{job_id}/export",
         "export_job",
@@ -1093,7 +1021,7 @@ class Jobs(ABC):
         media_types=MEDIA_TYPES,
         filename="{job_id}.{format}",
     )
-    def _table(self, job_id: str, *, format: TableFormat = "csv") -> Iterator[bytes]:  # noqa: A002
+    def export(self, job_id: str, format: TableFormat = "csv") -> Iterator[bytes]:  # noqa: A002
         """Return one row per design: iteration, particle, fitness, `design.<variable>`, and for
         every scenario `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`.
         Floats are exact.
@@ -1159,7 +1087,6 @@ class Jobs(ABC):
             Up to which iteration the digests are right, and the first difference.
 
         Raises:
-            InvalidRequest: An argument is invalid, or the simulations exceed the server's limit.
             EvaluatorUnavailable: Simulations cannot be run there.
         """
         from gaitswarm.evidence.verify import run_verification
@@ -1192,22 +1119,9 @@ class Jobs(ABC):
         recording_id = self._service.store.add_recording(walk, actor=self._context.actor)
         return RecordingView.from_walk(recording_id, walk)
 
-    def recordings(
-        self, *, search: str = "", limit: int | None = None
-    ) -> Iterator[RecordingEntryView]:
-        """List recorded walks, newest first.
-
-        Args:
-            search: Only walks whose id, scenario or controller contain this, ignoring case.
-            limit: Maximum number of walks; None for all.
-
-        Returns:
-            The walks without their currents.
-        """
-        return islice(_items(partial(self._recording_page, search=search)), limit)
-
+    @items
     @robots("GET /recordings", "list_recordings", "List recordings")
-    def _recording_page(
+    def recordings(
         self, *, search: SearchText = "", after: After = None, limit: PageLimit = 50
     ) -> PageView[RecordingEntryView]:
         """Return a page of recordings without their numbers, newest first. New ones do not shift
@@ -1258,13 +1172,3 @@ def job_view(service: JobService, job: Job) -> JobView:
     """Return the view of a job with its best design."""
     has_best = job.progress.best_fitness is not None
     return JobView.from_job_and_best(job, service.store.best(job.id) if has_best else None)
-
-
-def _items(page: Callable[..., PageView[V]], after: Any = None) -> Iterator[V]:
-    """Yield the items of all pages."""
-    while True:
-        read = page(after=after, limit=PAGE)
-        yield from read.items
-        if read.next is None:
-            return
-        after = read.next

@@ -16,10 +16,11 @@ from pydantic.fields import FieldInfo
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Job, Quota
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.services.optimizer.views import Request
-from gaitswarm.specs import checked
+from gaitswarm.specs import SpecOptions, checked, chosen_spec
 
 if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
@@ -143,7 +144,8 @@ class Operation:
     """A method of `Jobs` and its request.
 
     The arguments that the path does not name are the query of a GET. Otherwise they are the body:
-    a model of that name, or of that class; without `body`, the only one is the whole body.
+    a model of that name, or of that class; without `body`, the only one is the whole body, and with
+    AnySpec a spec and options are combined to it.
 
     Attributes:
         function: Computes the answer in this process.
@@ -171,7 +173,7 @@ class Operation:
     heavy: bool = False
     access: Access = "read"
     status: int = 200
-    body: str | type[BaseModel] | None = None
+    body: Any = None
     optional: bool = False
     media_type: str = BINARY
     media_types: Mapping[str, str] = field(default_factory=dict)
@@ -222,7 +224,7 @@ class Operation:
     @cached_property
     def is_whole(self) -> bool:
         """Whether one argument is the whole body."""
-        return self.method != "GET" and self.body is None and bool(self.names)
+        return self.method != "GET" and self.body in (None, AnySpec) and bool(self.names)
 
     @cached_property
     def request(self) -> Any:
@@ -230,7 +232,7 @@ class Operation:
         if not self.names:
             return None
         if self.is_whole:
-            return self.hints[self.names[0]]
+            return self.body or self.hints[self.names[0]]
         if isinstance(self.body, type):
             return self.body
         fields = dict(map(self._field, self.names))
@@ -264,6 +266,8 @@ class Operation:
         path = {name: given.pop(name) for name in self.path_names}
         if self.request is None:
             return path, None
+        if self.body is AnySpec:
+            return path, chosen_spec(given.pop("spec"), cast(SpecOptions, given))
         if self.is_whole:
             return path, given[self.names[0]]
         return path, checked(self.request, given)

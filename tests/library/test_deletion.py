@@ -42,7 +42,7 @@ def test_a_job_that_is_kept_is_not_deleted_until_it_is_released(
     assert jobs.keep(finished.id).kept
     with pytest.raises(gaitswarm.Conflict, match="release it first"):
         jobs.delete(finished.id)
-    assert not jobs.keep(finished.id, kept=False).kept
+    assert not jobs.release(finished.id).kept
     jobs.delete(finished.id)
 
 

@@ -125,7 +125,7 @@ def test_a_list_longer_than_a_page_is_whole(reach: Reach, many_jobs: Path) -> No
 REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
     "unknown state": (lambda jobs, _: list(jobs.jobs(state="flying")), "state"),
     "unknown order": (lambda jobs, _: list(jobs.jobs(order="age")), "order"),
-    "unknown format": (lambda jobs, job: list(jobs.export(job, cast(Any, "xlsx"))), "file_format"),
+    "unknown format": (lambda jobs, job: list(jobs.export(job, cast(Any, "xlsx"))), "format"),
     "unknown preference": (lambda jobs, job: jobs.ranking(job, cast(Any, "Z")), "preference"),
     "rank nothing": (lambda jobs, job: jobs.ranking(job, "A", top=0), "top"),
     "spent budget": (lambda jobs, job: jobs.extend(job, 1), "iterations"),
@@ -264,7 +264,7 @@ def test_evaluations_are_a_table_of_the_same_numbers(reach: Reach, finished: Fin
 
 def test_an_export_is_the_whole_table_in_parts(reach: Reach, finished: Finished) -> None:
     jobs = reach(finished.db)
-    content = b"".join(jobs.export(finished.id))
+    content = b"".join(jobs.export(finished.id, "parquet"))
     assert pq.read_table(io.BytesIO(content)).equals(jobs.evaluations(finished.id).to_arrow())
     lines = b"".join(jobs.export(finished.id, "csv")).splitlines()
     assert len(lines) == 7

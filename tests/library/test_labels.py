@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 import gaitswarm
-from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from tests.examples.commands import run_command
 from tests.library.conftest import Finished, Reach
 
@@ -23,9 +22,9 @@ def test_a_job_is_named_noted_tagged_and_archived(reach: Reach, finished: Finish
     assert (job.name, job.tags, job.archived) == ("renamed", ["a", "b"], True)
     # Nothing of it determines results.
     assert (job.spec, job.head, job.best) == (before.spec, before.head, before.best)
-    assert [found.id for found in jobs.jobs(where=JobFilter(archived=True, tag="b"))] == [job.id]
-    assert list(jobs.jobs(where=JobFilter(archived=False))) == []
-    assert [found.id for found in jobs.jobs(where=JobFilter(controller="pi"))] == [job.id]
+    assert [found.id for found in jobs.jobs(archived=True, tag="b")] == [job.id]
+    assert list(jobs.jobs(archived=False)) == []
+    assert [found.id for found in jobs.jobs(controller="pi")] == [job.id]
     assert (job.robot, job.preference) == ("szabadka2-reconstructed", "A")
 
 

@@ -107,8 +107,8 @@ def test_every_argument_is_documented(name: str) -> None:
     arguments = [
         parameter.name
         for parameter in inspect.signature(function).parameters.values()
-        # `Jobs` documents `job_id` once for all methods.
-        if parameter.name not in ("self", "cls", "job_id")
+        # `Jobs` documents `job_id` and `after` once for all methods.
+        if parameter.name not in ("self", "cls", "job_id", "after")
         and parameter.kind != parameter.VAR_KEYWORD
     ]
     written = re.findall(r"^    (\w+): \S", sections.get("Args", ""), re.MULTILINE)

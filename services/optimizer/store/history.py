@@ -60,8 +60,10 @@ from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import (
     chain_documents,
     job_row,
+    parsed,
     provenance_document,
     require_job,
+    to_job,
 )
 from gaitswarm.services.optimizer.store.tables import (
     Row,
@@ -483,7 +485,7 @@ def take_history(
     if taken.fitness is not None:
         _rejudge(connection, job_id, taken.fitness)
     provenance = provenance_document(taken.provenance)
-    documents = chain_documents({**job, "provenance": provenance})
+    documents = ChainDocuments(parsed(job["spec"]), parsed(job["lineage"]), provenance)
     return {
         "iterations": end,
         "evaluations": count,
@@ -491,7 +493,7 @@ def take_history(
         "provenance": provenance,
         "head": chain_iterations(connection, job_id, documents, end),
         "accepts_changes": taken.accepts_changes,
-        **_best_columns(connection, job_id, job["spec"]["precision"]),
+        **_best_columns(connection, job_id, to_job(job).spec.precision),
     }
 
 

@@ -39,7 +39,7 @@ from gaitswarm.services.optimizer.jobs.listing import (
     to_cursor,
 )
 from gaitswarm.services.optimizer.store.engine import Aggregate
-from gaitswarm.services.optimizer.store.job_rows import SHOWN, is_job_id, shown_job
+from gaitswarm.services.optimizer.store.job_rows import COLUMNS, is_job_id, to_job
 from gaitswarm.services.optimizer.store.tables import EXISTING, jobs
 from gaitswarm.sim.robot.variant import SHIPPED
 
@@ -95,14 +95,14 @@ class JobList(Aggregate):
             for ids, place in _pages(conditions, key, last, descending):
                 # Only ids are sorted and filtered: specs may be large.
                 page = ids.limit(limit + 1 - len(rows))
-                shown = select(*SHOWN, key.label("sort_key")).where(jobs.c.id.in_(page))
-                rows += connection.execute(shown.order_by(*place)).all()
+                shown = select(*COLUMNS, key.label("sort_key")).where(jobs.c.id.in_(page))
+                rows += connection.execute(shown.order_by(*place)).mappings()
                 if len(rows) > limit:
                     break
-        items = tuple(map(shown_job, rows[:limit]))
+        items = tuple(map(to_job, rows[:limit]))
         if len(rows) <= limit:
             return Page(items, None)
-        return Page(items, to_cursor(cursor, rows[limit - 1].sort_key, items[-1].id))
+        return Page(items, to_cursor(cursor, rows[limit - 1]["sort_key"], items[-1].id))
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by facet."""
@@ -207,9 +207,9 @@ def _key(connection: Connection, order: JobOrder) -> ColumnElement[Any]:
 
 def _time_left(connection: Connection) -> ColumnElement[Any]:
     """Return the estimates of the few running jobs; they depend on the time."""
-    running = select(*SHOWN).where(EXISTING, jobs.c.state == JobState.RUNNING)
+    running = select(*COLUMNS).where(EXISTING, jobs.c.state == JobState.RUNNING)
     now = datetime.now(UTC)
-    shown = (shown_job(row) for row in connection.execute(running))
+    shown = map(to_job, connection.execute(running).mappings())
     times = {job.id: time_left(job, now).eta_seconds for job in shown}
     known = {job_id: literal(s, Double) for job_id, s in times.items() if s is not None}
     return case(known, value=jobs.c.id) if known else func.nullif(literal(0.0, Double), 0.0)

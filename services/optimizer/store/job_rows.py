@@ -13,7 +13,6 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 from sqlalchemy import Connection, Select, Text, cast, insert, select, update
-from sqlalchemy import Row as SqlRow
 
 from gaitswarm.services.optimizer.errors import NotFound, Unreadable
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
@@ -26,7 +25,6 @@ from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.store.tables import (
     EXISTING,
     Row,
-    UnparsedText,
     jobs,
     notifications,
 )
@@ -45,28 +43,25 @@ _REMEDY: Final = (
 _LARGE_SPEC: Final = 65_536
 """Length of a spec, in characters, from which it is parsed every time."""
 
-_DOCUMENTS: Final = ("spec", "provenance", "lineage")
+_DOCUMENTS: Final = ("spec", "provenance", "lineage", "labels")
 
 _SAME_NAME: Final = tuple(
     field.name
     for field in fields(Job)
-    if field.name in jobs.c and field.name not in (*_DOCUMENTS, "state", "labels")
+    if field.name in jobs.c and field.name not in (*_DOCUMENTS, "state")
 )
 """Columns that are fields of `Job`."""
 
 _PROGRESS: Final = tuple(field.name for field in fields(Progress))
 """Columns that are fields of `Progress`."""
 
-SHOWN: Final = (
-    *(cast(jobs.c[name], Text).label(name) for name in _DOCUMENTS),
-    *(jobs.c[name] for name in (*_SAME_NAME, *_PROGRESS, "state", "labels", "budget")),
-    *(jobs.c[f"reference_{field.name}"] for field in fields(Reference)),
+COLUMNS: Final = tuple(
+    cast(column, Text).label(column.name) if column.name in _DOCUMENTS else column
+    for column in jobs.c
 )
-"""Columns of `shown_job`."""
+"""Columns of a row of a job; documents are text, so that a damaged one hides no other row."""
 
 _LINEAGE: Final[TypeAdapter[Lineage | None]] = TypeAdapter(Lineage | None)
-
-_Documents = tuple[AnySpec, ProvenanceRecords, Lineage | None]
 
 
 def new_job_id() -> str:
@@ -80,18 +75,13 @@ def is_job_id(text: str) -> bool:
 
 
 def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
-    """Return all columns of a job. Raises NotFound.
+    """Return the row of a job. Raises NotFound.
 
     Every transaction that changes a job locks it first, so that two commands, or a command and a
     commit, never act on the same state.
     """
-    query = select(jobs)
-    return _row(connection, job_id, query.with_for_update() if lock else query)._mapping  # noqa: SLF001
-
-
-def read_job(connection: Connection, job_id: str) -> Job:
-    """Return a job. Raises NotFound."""
-    return shown_job(_row(connection, job_id, select(*SHOWN)))
+    query = select(*COLUMNS)
+    return _row(connection, job_id, query.with_for_update() if lock else query)
 
 
 def require_job(connection: Connection, job_id: str) -> None:
@@ -99,9 +89,9 @@ def require_job(connection: Connection, job_id: str) -> None:
     _row(connection, job_id, select(jobs.c.id))
 
 
-def _row(connection: Connection, job_id: str, query: Select[Any]) -> SqlRow[Any]:
+def _row(connection: Connection, job_id: str, query: Select[Any]) -> Row:
     if is_job_id(job_id):
-        row = connection.execute(query.where(jobs.c.id == job_id, EXISTING)).first()
+        row = connection.execute(query.where(jobs.c.id == job_id, EXISTING)).mappings().first()
         if row is not None:
             return row
     raise NotFound(f"there is no job {job_id!r}")
@@ -109,23 +99,23 @@ def _row(connection: Connection, job_id: str, query: Select[Any]) -> SqlRow[Any]
 
 def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
     """Change a locked job and return its row; a job that ends leaves a notification."""
-    connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
-    after = {**row, **columns}
+    statement = update(jobs).where(jobs.c.id == row["id"]).values(**columns).returning(*COLUMNS)
+    after = connection.execute(statement).mappings().one()
     if after["notify_url"] is not None and "state" in columns and after["finished_at"] is not None:
         _add_notification(connection, after)
     return after
 
 
 def _add_notification(connection: Connection, job: Row) -> None:
-    spec, ended_at = job["spec"], job["finished_at"]
+    ended_at = job["finished_at"]
     document = {
         "type": f"job.{job['state']}",
         "timestamp": ended_at.isoformat(),
         "data": {
             "id": job["id"],
-            "name": spec.get("name", "") if isinstance(spec, dict) else "",
-            "state": str(job["state"]),
-            **{name: job[name] for name in ("iterations", "evaluations", "best_fitness", "error")},
+            "name": to_job(job).stored_spec.name,
+            **{name: job[name] for name in ("state", "iterations", "evaluations", "best_fitness")},
+            "error": job["error"],
         },
     }
     connection.execute(
@@ -154,20 +144,26 @@ def entering(state: JobState, now: datetime) -> dict[str, Any]:
     return columns
 
 
-def to_job(row: Row, documents: _Documents | None = None) -> Job:
-    """Build a job from its columns, and from its documents if they have been read."""
+def to_job(row: Row) -> Job:
+    """Build a job from its row. Equal documents are parsed once."""
     spec: AnySpec | UnreadableSpec
+    read = _read_documents if len(row["spec"]) < _LARGE_SPEC else _read_documents.__wrapped__
     try:
-        spec, provenance, lineage = documents or _read_documents(*(row[n] for n in _DOCUMENTS))
+        spec, provenance, lineage = read(row["spec"], row["provenance"], row["lineage"])
     except Unreadable as error:
         # Results must not be added to those of unknown provenance.
-        spec, provenance, lineage = _described(row["spec"], str(error)), (), None
+        spec, provenance, lineage = _described(parsed(row["spec"]), str(error)), (), None
     submitted_iterations = spec.iterations
     if row["budget"] is not None:
         if isinstance(spec, UnreadableSpec):
             spec = replace(spec, iterations=row["budget"])
         else:
             spec = spec.with_budget(row["budget"])
+    try:
+        labels = Labels() if row["labels"] is None else Labels.model_validate_json(row["labels"])
+    except ValidationError:
+        # Nothing depends on them.
+        labels = Labels()
     return Job(
         **{name: row[name] for name in _SAME_NAME},
         stored_spec=spec,
@@ -176,49 +172,27 @@ def to_job(row: Row, documents: _Documents | None = None) -> Job:
         provenance=provenance,
         lineage=lineage,
         submitted_iterations=submitted_iterations,
-        labels=labels_of(row),
+        labels=labels,
         reference=None
         if row["reference_kind"] is None
         else Reference(row["reference_name"], row["reference_fitness"], row["reference_kind"]),
     )
 
 
-def shown_job(row: SqlRow[Any]) -> Job:
-    """Build a job from the columns `SHOWN`. Equal documents are parsed once."""
-    columns = dict(row._mapping)  # noqa: SLF001
-    texts = [columns[name] for name in _DOCUMENTS]
-    small = len(texts[0]) < _LARGE_SPEC
-    try:
-        return to_job(columns, (_cached_documents if small else _documents_from_text)(*texts))
-    except Unreadable:
-        return to_job(columns | dict(zip(_DOCUMENTS, map(_parsed, texts), strict=True)))
-
-
-def _documents_from_text(*texts: str | None) -> _Documents:
-    return _read_documents(*map(_parsed, texts))
-
-
-_cached_documents: Final = lru_cache(maxsize=1024)(_documents_from_text)
-
-
-def _parsed(text: str | None) -> Any:
-    try:
-        return None if text is None else json.loads(text)
-    except (ValueError, RecursionError):
-        return UnparsedText(text)
-
-
-def _read_documents(spec: Any, provenance: Any, lineage: Any) -> _Documents:
+@lru_cache(maxsize=1024)
+def _read_documents(
+    spec: str, provenance: str | None, lineage: str | None
+) -> tuple[AnySpec, ProvenanceRecords, Lineage | None]:
     """Raise Unreadable for documents of another version, or damaged ones."""
-    if isinstance(spec, UnparsedText):
-        raise unreadable("its spec is not JSON")
     what = "spec"
     try:
-        read_spec = SPECS.validate_python(spec)
+        read_spec = SPECS.validate_python(json.loads(spec))
         what = "provenance"
-        records = provenance_records(provenance)
+        records = RECORDS.validate_python(() if provenance is None else parsed(provenance))
         what = "lineage"
-        return read_spec, records, _LINEAGE.validate_python(lineage)
+        return read_spec, records, _LINEAGE.validate_python(parsed(lineage))
+    except (json.JSONDecodeError, RecursionError):
+        raise unreadable(f"its {what} is not JSON") from None
     except ValidationError as error:
         problem = first_problems(error)
     except Exception as error:  # noqa: BLE001 - one damaged job must not hide the others
@@ -226,9 +200,12 @@ def _read_documents(spec: Any, provenance: Any, lineage: Any) -> _Documents:
     raise unreadable(f"its {what} cannot be read by this gaitswarm ({problem})")
 
 
-def provenance_records(document: Any) -> ProvenanceRecords:
-    """Raise ValidationError for a document that is not provenance."""
-    return RECORDS.validate_python(() if document is None else document)
+def parsed(text: str | None) -> Any:
+    """Return a stored document; itself if it is not JSON."""
+    try:
+        return None if text is None else json.loads(text)
+    except (ValueError, RecursionError):
+        return text
 
 
 def _described(document: Any, reason: str) -> UnreadableSpec:
@@ -261,17 +238,9 @@ def first_problems(error: ValidationError) -> str:
     return "; ".join(lines)
 
 
-def labels_of(row: Row) -> Labels:
-    """Return a job's labels; none if they are unreadable, as nothing depends on them."""
-    try:
-        return Labels() if row["labels"] is None else Labels.model_validate(row["labels"])
-    except ValidationError:
-        return Labels()
-
-
 def chain_documents(row: Row) -> ChainDocuments:
     """Return the documents of a job's chain as stored, readable or not."""
-    return ChainDocuments(row["spec"], row["lineage"], row["provenance"])
+    return ChainDocuments(*(parsed(row[name]) for name in ("spec", "lineage", "provenance")))
 
 
 def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:

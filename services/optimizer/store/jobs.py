@@ -46,12 +46,11 @@ from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import take_history
 from gaitswarm.services.optimizer.store.job_rows import (
+    COLUMNS,
     entering,
     job_row,
-    labels_of,
     new_job_id,
     provenance_document,
-    read_job,
     to_job,
     update_job,
 )
@@ -203,7 +202,7 @@ class Jobs(Aggregate):
             **_search_columns(job_id, spec.name, Labels()),
             **columns,
         }
-        statement = insert(jobs).values(values).returning(jobs)
+        statement = insert(jobs).values(values).returning(*COLUMNS)
         row: Row = connection.execute(statement).mappings().one()
         action, details = AuditAction.SUBMIT, {}
         if lineage is not None:
@@ -217,7 +216,7 @@ class Jobs(Aggregate):
     def job(self, job_id: str) -> Job:
         """Return a job, whether its spec is readable or not."""
         with self._database.read("job") as connection:
-            return read_job(connection, job_id)
+            return to_job(job_row(connection, job_id))
 
     def command(
         self,
@@ -329,10 +328,10 @@ class Jobs(Aggregate):
         """Change a job's labels; results do not depend on them."""
         with self._database.write("label") as connection:
             row = job_row(connection, job_id, lock=True)
-            labels, spec = change.applied(labels_of(row)), row["spec"]
-            name = spec.get("name") if isinstance(spec, dict) else None
+            job = to_job(row)
+            labels = change.applied(job.labels)
             columns: dict[str, Any] = {"labels": labels.model_dump(mode="json")}
-            columns |= _search_columns(job_id, str(name or ""), labels)
+            columns |= _search_columns(job_id, job.stored_spec.name, labels)
             if change.archived is not None:
                 columns["archived"] = change.archived
             note_change(connection, self._clock(connection), actor, AuditAction.LABEL, job_id)
@@ -452,7 +451,7 @@ def _repeated_job(
     connection: Connection, key: str | None, digest: str | None, spec: Spec, lineage: Lineage | None
 ) -> Job | None:
     """Return the job that the same key created. Raises IdempotencyConflict for another request."""
-    query = select(jobs).where(jobs.c.idempotency_key == key)
+    query = select(*COLUMNS).where(jobs.c.idempotency_key == key)
     row = None if key is None else connection.execute(query).mappings().first()
     if row is None:
         return None

@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.job import (
     UnreadableSpec,
 )
 from gaitswarm.services.optimizer.jobs.listing import storable
-from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
+from gaitswarm.services.optimizer.jobs.provenance import RECORDS, JobProvenance, with_record
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import (
     answered_ask,
@@ -34,10 +34,11 @@ from gaitswarm.services.optimizer.store.history import (
     open_ask,
 )
 from gaitswarm.services.optimizer.store.job_rows import (
+    COLUMNS,
     entering,
     job_row,
+    parsed,
     provenance_document,
-    provenance_records,
     require_job,
     to_job,
     unreadable,
@@ -84,7 +85,7 @@ class Leases(Aggregate):
                 jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING)), not_(has_live_lease(now))
             )
             query = (
-                select(jobs)
+                select(*COLUMNS)
                 .where(or_(jobs.c.state == JobState.QUEUED, abandoned))
                 .order_by(jobs.c.priority.desc(), jobs.c.created_at, jobs.c.id)
                 .limit(1)
@@ -130,10 +131,11 @@ class Leases(Aggregate):
         Clears the user's acceptance of changes.
         """
         with self._held("record_provenance", claim) as (connection, row):
-            before = provenance_records(row["provenance"])
+            stored = parsed(row["provenance"]) or ()
+            before = RECORDS.validate_python(stored)
             added = with_record(before, row["iterations"], provenance)[len(before) :]
             # Earlier records stay as written, as digests depend on them.
-            document = [*(row["provenance"] or ()), *provenance_document(added)]
+            document = [*stored, *provenance_document(added)]
             update_job(connection, row, {"provenance": document, "accepts_changes": False})
 
     def begin(self, claim: Claim, ask: Ask) -> None:
@@ -317,7 +319,7 @@ def take_job(
         journal = () if ask is None else journal_of(connection, row)
     except NotFound as error:
         raise unreadable(str(error)) from error
-    except (ValueError, TypeError, LookupError) as error:
+    except (ValueError, TypeError, LookupError, RecursionError) as error:
         raise unreadable(f"its iteration {row['iterations']} cannot be read ({error})") from error
     owner, token = row["lease_owner"], row["lease_token"] + 1
     changes = entering(JobState.RUNNING, now) | {
@@ -333,10 +335,7 @@ def take_job(
 
 
 def _require_budget(claim: Claim, row: Row) -> None:
-    try:
-        budget = int(row["spec"]["iterations"] if row["budget"] is None else row["budget"])
-    except (TypeError, LookupError, ValueError):
-        raise unreadable("its budget cannot be read") from None
+    budget = to_job(row).stored_spec.iterations
     if budget != claim.job.spec.iterations:
         raise BudgetChanged(f"job {row['id']} is to run {budget} iterations now")
 

@@ -47,7 +47,6 @@ from gaitswarm.services.optimizer.store.schema import (
 )
 from gaitswarm.services.optimizer.store.tables import (
     EXISTING,
-    Document,
     evaluations,
     iterations,
     jobs,
@@ -203,7 +202,7 @@ def _copy_rows(source: Connection, target: Connection) -> None:
         parameters = {
             # A missing document stays SQL's NULL.
             column.name: bindparam(column.name, type_=JSON(none_as_null=True))
-            if isinstance(column.type, (JSON, Document))
+            if isinstance(column.type, JSON)
             else bindparam(column.name)
             for column in table.c
         }

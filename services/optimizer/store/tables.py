@@ -12,8 +12,7 @@ from datetime import UTC, datetime
 from typing import Any, Final
 
 import sqlalchemy as sa
-from sqlalchemy.sql.operators import OperatorType
-from sqlalchemy.types import TypeDecorator, TypeEngine
+from sqlalchemy.types import TypeDecorator
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 
@@ -53,34 +52,6 @@ class UtcDateTime(TypeDecorator[datetime]):
         return aware
 
 
-class UnparsedText(str):
-    """A stored text that is not JSON."""
-
-    __slots__ = ()
-
-
-class Document(TypeDecorator[Any]):
-    """A JSON document; a damaged one is read as `UnparsedText`, so that it hides no other row."""
-
-    impl = sa.JSON
-    cache_ok = True
-
-    def coerce_compared_value(self, op: OperatorType | None, value: Any) -> TypeEngine[Any]:
-        # Paths into the document are names, as for JSON.
-        return self.impl_instance.coerce_compared_value(op, value)
-
-    def result_processor(self, dialect: sa.Dialect, coltype: object) -> Callable[[Any], Any] | None:
-        parse = super().result_processor(dialect, coltype)
-
-        def parse_if_possible(raw: Any) -> Any:
-            try:
-                return raw if parse is None else parse(raw)
-            except (ValueError, RecursionError):
-                return UnparsedText(raw)
-
-        return parse_if_possible
-
-
 metadata: Final = sa.MetaData(
     naming_convention={
         "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -97,7 +68,7 @@ jobs: Final = sa.Table(
     metadata,
     sa.Column("id", sa.Text, primary_key=True),
     sa.Column("state", sa.Text, nullable=False),
-    sa.Column("spec", Document, nullable=False),
+    sa.Column("spec", sa.JSON, nullable=False),
     sa.Column("idempotency_key", sa.Text, unique=True),
     sa.Column("created_at", UtcDateTime, nullable=False),
     sa.Column("updated_at", UtcDateTime, nullable=False),
@@ -120,7 +91,7 @@ jobs: Final = sa.Table(
     # Of the request with the idempotency key; NULL without a key.
     sa.Column("request_digest", sa.Text),
     # `ProvenanceRecords`.
-    sa.Column("provenance", Document(none_as_null=True)),
+    sa.Column("provenance", sa.JSON(none_as_null=True)),
     # See `Job.accepts_changes`.
     sa.Column("accepts_changes", sa.Boolean, nullable=False, server_default=sa.false()),
     # Evaluations answered from the cache, and those taken over by a fork.
@@ -128,7 +99,7 @@ jobs: Final = sa.Table(
     sa.Column("evaluations_taken", sa.BigInteger, nullable=False, server_default="0"),
     # Of a fork; no foreign key, as a fork outlives its parent.
     sa.Column("parent_id", sa.Text, index=True),
-    sa.Column("lineage", Document(none_as_null=True)),
+    sa.Column("lineage", sa.JSON(none_as_null=True)),
     # Name of the token it was submitted with; NULL for none.
     sa.Column("owner", sa.Text),
     # Consecutive claims whose lease expired.
@@ -150,7 +121,7 @@ jobs: Final = sa.Table(
     # Higher priorities are claimed first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
     # `Labels`; NULL for none.
-    sa.Column("labels", Document(none_as_null=True)),
+    sa.Column("labels", sa.JSON(none_as_null=True)),
     # Hidden in lists.
     sa.Column("archived", sa.Boolean, nullable=False, server_default=sa.false()),
     # `Reference`; NULL until determined, the kind until then only.
@@ -192,8 +163,8 @@ iterations: Final = sa.Table(
     sa.Column("iteration", sa.Integer, primary_key=True),
     # The ask: (particles, d) positions and the optimizer's state, {} once a later iteration is
     # committed.
-    sa.Column("positions", Document, nullable=False),
-    sa.Column("optimizer_state", Document, nullable=False),
+    sa.Column("positions", sa.JSON, nullable=False),
+    sa.Column("optimizer_state", sa.JSON, nullable=False),
     sa.Column("asked_at", UtcDateTime, nullable=False),
     # The following are NULL until the iteration is committed, the statistics also if all designs
     # failed.
@@ -258,7 +229,7 @@ recordings: Final = sa.Table(
     metadata,
     # Digest of the content.
     sa.Column("id", sa.Text, primary_key=True),
-    sa.Column("document", Document, nullable=False),
+    sa.Column("document", sa.JSON, nullable=False),
     sa.Column("created_at", UtcDateTime, nullable=False),
     # What a list shows of it; see `RecordingEntry`.
     *(sa.Column(n, sa.Text, nullable=False) for n in ("scenario", "controller")),

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.worker.in_process import InProcessEvaluator
-    from gaitswarm.services.worker.ray_evaluator import AutoEvaluator, RayEvaluator
+    from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 
 def open_evaluator(
@@ -47,18 +47,19 @@ def open_evaluator(
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     lasting: bool = False,
-) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
+) -> InProcessEvaluator | RayEvaluator:
     """Create the evaluator of a kind."""
     from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
-    from gaitswarm.services.worker.ray_evaluator import AutoEvaluator, RayEvaluator  # noqa: PLC0415
+    from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
 
     check_address(address)
     if kind == "in-process" or (kind == "auto" and address is None and not lasting):
         return InProcessEvaluator(cpus)
-    if kind == "auto" and address is None:
-        return AutoEvaluator(cpus)
     ray = RayEvaluator(address, cpus=cpus)
-    ray.wait_until_open(should_stop, lasting=lasting)
+    if lasting:
+        ray.keep_open()
+    else:
+        ray.wait_until_open(should_stop)
     return ray
 
 
@@ -142,7 +143,6 @@ def open_runtime(
     retention_days: float | None = None,
     audit_days: float | None = None,
     longest_fork: float = math.inf,
-    should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
     webhook_hosts: Collection[str] = (),
     webhook_secret: str | None = None,
@@ -174,7 +174,6 @@ def open_runtime(
             evaluator,
             address=ray_address,
             cpus=cpus,
-            should_stop=should_stop,
             lasting=True,
         )
         stack.callback(workers.close)

@@ -7,7 +7,7 @@ import json
 import logging
 import sys
 import threading
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -150,7 +150,6 @@ def runner(options: RunnerOptions) -> None:
     Running jobs then commit their current iterations and return to the queue; a second signal
     discards these iterations.
     """
-    from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
     from gaitswarm.services.runtime import stop_on_signals
     from gaitswarm.settings import read_settings
 
@@ -165,9 +164,8 @@ def runner(options: RunnerOptions) -> None:
         metrics = Metrics()
     # A signal while connecting to a cluster ends the command.
     with (
-        suppress(EvaluationStopped),
         stop_on_signals(stop, at_once),
-        _runtime(settings, metrics, should_stop=stop.is_set) as opened,
+        _runtime(settings, metrics) as opened,
         ExitStack() as stack,
     ):
         log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
@@ -228,7 +226,6 @@ def _runtime(
     *,
     runs_jobs: bool = True,
     housekeeping: bool = False,
-    should_stop: Callable[[], bool] = lambda: False,
     activity: Activity | None = None,
 ) -> AbstractContextManager[Runtime]:
     from gaitswarm.jobs.open import database_to_write
@@ -248,7 +245,6 @@ def _runtime(
         retention_days=settings.retention_days,
         audit_days=settings.audit_days,
         longest_fork=settings.api_max_fork_seconds,
-        should_stop=should_stop,
         metrics=metrics,
         webhook_hosts=settings.webhook_hosts,
         webhook_secret=settings.webhook_secret,

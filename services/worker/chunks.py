@@ -40,23 +40,6 @@ class Chunk:
     stop: int
     cost: float
 
-    def halves(self) -> tuple[Chunk, ...]:
-        """Split into two chunks, by designs and then by cases; empty if there is one of each."""
-        half = 0.5 * self.cost
-        if self.stop - self.start > 1:
-            middle = (self.start + self.stop) // 2
-            return (
-                Chunk(self.cases, self.start, middle, half),
-                Chunk(self.cases, middle, self.stop, half),
-            )
-        if len(self.cases) > 1:
-            middle = len(self.cases) // 2
-            return (
-                Chunk(self.cases[:middle], self.start, self.stop, half),
-                Chunk(self.cases[middle:], self.start, self.stop, half),
-            )
-        return ()
-
 
 @dataclass(frozen=True, slots=True)
 class Pace:

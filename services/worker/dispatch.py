@@ -55,11 +55,8 @@ class Engine(Protocol):
     def slots(self) -> int:
         """Number of tasks that run concurrently."""
 
-    def submit(self, request: EvaluationRequest, chunk: Chunk, attempts: int, /) -> Any:
-        """Submit a task and return a handle.
-
-        attempts: number of processes that may die of it before it fails.
-        """
+    def submit(self, request: EvaluationRequest, chunk: Chunk, /) -> Any:
+        """Submit a task and return a handle. It fails once `MOST_KILLED` processes died of it."""
 
     def wait(self, handles: Sequence[Any], seconds: float) -> Sequence[Any]:
         """Return the handles of finished tasks; wait for one up to a time [s]."""
@@ -88,19 +85,16 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class _Running:
-    """suspect: a worker has died of the chunk that it is a part of."""
-
     chunk: Chunk
     begun: float
-    suspect: bool
 
 
 @dataclass(slots=True, eq=False)
 class _Iteration:
-    """A request in progress. pending: chunks, each with whether it is suspect."""
+    """A request in progress."""
 
     request: EvaluationRequest
-    pending: deque[tuple[Chunk, bool]]
+    pending: deque[Chunk]
     outcomes: tuple[Outcome, ...]
     running: dict[Any, _Running] = field(default_factory=dict)
     times: list[tuple[float, float, float]] = field(default_factory=list)
@@ -112,7 +106,7 @@ class _Iteration:
             Outcome(np.empty((count, len(case.objectives))), np.empty(count, dtype=np.uint8))
             for case in request.cases
         )
-        return cls(request, deque((chunk, False) for chunk in chunks), empty)
+        return cls(request, deque(chunks), empty)
 
     def put(self, chunk: Chunk, answer: Answer) -> None:
         """Copy an answer to its place."""
@@ -160,12 +154,12 @@ def unlike(host: str, refusal: str) -> ProvenanceChanged:
 
 
 def killed_workers(request: EvaluationRequest, chunk: Chunk) -> KilledWorker:
-    """Return the error for a design of which workers die."""
+    """Return the error for a task of which workers die."""
     names = ", ".join(repr(request.cases[case].name) for case in chunk.cases)
     return KilledWorker(
-        f"{MOST_KILLED} worker processes died, one after the other, of the same task: design"
-        f" {chunk.start} of the iteration in {names}. If its simulation is not at fault, the"
-        " workers may lack memory; resume the job to try again"
+        f"{MOST_KILLED} worker processes died, one after the other, of the same task: designs"
+        f" {chunk.start} to {chunk.stop - 1} of the iteration in {names}. If their simulation is"
+        " not at fault, the workers may lack memory; resume the job to try again"
     )
 
 
@@ -241,11 +235,9 @@ class Dispatcher:
     def _submit(self, engine: Engine, iteration: _Iteration) -> None:
         most = self.most_submitted(iteration.request, engine.slots)
         while iteration.pending and len(iteration.running) < most:
-            chunk, suspect = iteration.pending.popleft()
-            # Of a suspect chunk only the part that is at fault is tried again.
-            attempts = 1 if suspect and chunk.halves() else MOST_KILLED
-            handle = engine.submit(iteration.request, chunk, attempts)
-            iteration.running[handle] = _Running(chunk, time.monotonic(), suspect)
+            chunk = iteration.pending.popleft()
+            handle = engine.submit(iteration.request, chunk)
+            iteration.running[handle] = _Running(chunk, time.monotonic())
 
     def _settle(self, engine: Engine, iteration: _Iteration, handle: Any) -> None:
         run = iteration.running.pop(handle)
@@ -253,15 +245,11 @@ class Dispatcher:
             answer = engine.answer(handle)
         except TaskLost as error:
             iteration.report(run, error=f"lost: {error}")
-            iteration.pending.appendleft((run.chunk, run.suspect))
+            iteration.pending.appendleft(run.chunk)
             return
         except WorkerDied:
             iteration.report(run, error="its worker died")
-            halves = run.chunk.halves()
-            if not halves:
-                raise killed_workers(iteration.request, run.chunk) from None
-            iteration.pending.extendleft((half, True) for half in halves)
-            return
+            raise killed_workers(iteration.request, run.chunk) from None
         except Exception as error:
             iteration.report(run, error=f"{type(error).__name__}: {error}")
             raise

@@ -63,7 +63,7 @@ class InProcessEvaluator:
         self._closed.set()
         self._pool.shutdown()
 
-    def submit(self, request: EvaluationRequest, chunk: Chunk, _attempts: int, /) -> _Task:
+    def submit(self, request: EvaluationRequest, chunk: Chunk, /) -> _Task:
         """Queue a task for the threads."""
         abandoned = threading.Event()
 

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from typing import Any, Final
 
-from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from gaitswarm.services.worker.chunks import Chunk
 from gaitswarm.services.worker.dispatch import (
@@ -24,7 +24,7 @@ from gaitswarm.services.worker.dispatch import (
     build_kernels,
     unlike,
 )
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.in_process import available_cpus
 from gaitswarm.services.worker.ray_session import RaySession, open_ray
 from gaitswarm.services.worker.tasks import (
     Answer,
@@ -32,7 +32,6 @@ from gaitswarm.services.worker.tasks import (
     Shared,
     arithmetic_digest,
     run_in_worker,
-    warm_up,
 )
 from gaitswarm.sim.outcome import Outcome
 
@@ -84,8 +83,7 @@ class RayEvaluator:
 
     @property
     def slots(self) -> int:
-        """CPUs of the cluster. Waits until it is open."""
-        self._connection.opened.result()
+        """CPUs of the cluster; 0 before it is open, unless it is local."""
         return self._connection.slots
 
     @property
@@ -115,24 +113,8 @@ class RayEvaluator:
             return f"retrying: {error}"
         return "Ray is unreachable; it is opened again for the next iteration"
 
-    def is_warm(self) -> bool:
-        """Return whether Ray is open and its processes have imported what they need.
-
-        A lost connection begins to be opened again.
-
-        Raises:
-            EvaluatorUnavailable: Ray cannot be opened.
-        """
-        connection = self._connection
-        if not connection.opened.done():
-            return False
-        connection.opened.result()
-        return self._living().warm.is_set()
-
-    def wait_until_open(self, should_stop: Callable[[], bool], *, lasting: bool = False) -> None:
+    def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
         """Return when Ray is open, and close this evaluator if it cannot be.
-
-        lasting: also return if Ray is away, and open it as soon as it is there.
 
         Raises:
             EvaluatorUnavailable: Ray cannot be opened.
@@ -144,23 +126,25 @@ class RayEvaluator:
             # Ray cannot be interrupted while it connects.
             threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
             raise
-        except EvaluatorUnavailable as error:
-            if not lasting:
-                self.close()
-                raise
-            _log.warning("jobs wait for workers: %s", error)
-        if lasting:
-            threading.Thread(target=self._reconnect, name="ray-reconnect", daemon=True).start()
+        except EvaluatorUnavailable:
+            self.close()
+            raise
+
+    def keep_open(self) -> None:
+        """Open Ray again whenever it is lost, in a thread. Returns at once."""
+        threading.Thread(target=self._reconnect, name="ray-reconnect", daemon=True).start()
 
     def _reconnect(self) -> None:
-        was_away = self.lost
+        reported: str | None = None
         while not self._closing.wait(_RECONNECT_SECONDS):
             if self.lost:
-                was_away = True
+                if reported != "away":
+                    _log.warning("jobs wait for workers: %s", self.trouble())
+                reported = "away"
                 with suppress(EvaluatorUnavailable):
                     self._living()
-            elif was_away and self._connection.opened.done():
-                was_away = False
+            elif self._connection.opened.done() and reported != "open":
+                reported = "open"
                 _log.info("Ray is open, with %d slots", self.slots)
 
     def evaluate(
@@ -197,15 +181,13 @@ class _Connection:
     process has one connection at a time: the next one is opened when the last one is closed.
 
     opened: result None, or why it cannot be opened.
-    warm: set when the processes of a local cluster have imported what they need.
     """
 
     def __init__(
         self, address: str | None, cpus: int | None, *, after: _Connection | None = None
     ) -> None:
         self.opened: Future[None] = Future()
-        self.warm = threading.Event()
-        self.slots = 0
+        self.slots = 0 if address else cpus or available_cpus()
         self.nodes = 0
         self._ended: str | None = None
         self._empty_since: float | None = None
@@ -254,15 +236,14 @@ class _Connection:
         if empty is not None and time.monotonic() - empty > EMPTY_SECONDS:
             raise EvaluatorUnavailable("no node of the Ray cluster has a CPU for simulations")
 
-    def submit(self, request: EvaluationRequest, chunk: Chunk, attempts: int, /) -> Any:
+    def submit(self, request: EvaluationRequest, chunk: Chunk, /) -> Any:
         """Submit a task to Ray, which places it and repeats it if its worker dies."""
         cases = chunk.cases
         first = request.cases[cases[0]].name
         name = f"simulate {first}" + (f" and {len(cases) - 1} more" if len(cases) > 1 else "")
-        options = {"name": name, "max_retries": attempts - 1}
         designs = request.designs[chunk.start : chunk.stop]
         with self._reached():
-            return self._remote.options(**options).remote((self._put(request),), cases, designs)
+            return self._remote.options(name=name).remote((self._put(request),), cases, designs)
 
     def wait(self, handles: Sequence[Any], seconds: float) -> Sequence[Any]:
         """Return all finished tasks, some unless the time is over."""
@@ -356,17 +337,8 @@ class _Connection:
 
     def _watch(self, session: RaySession) -> None:
         """Count nodes, check the head and cancel abandoned tasks until the connection ends."""
-        starting: list[Any] = []
-        if session.directory is not None:
-            start = session.ray.remote(num_cpus=1, max_retries=0)(warm_up)
-            starting = [start.remote() for _ in range(self.slots)]
-        misses, next_look, next_pulse = 0, 0.0, time.monotonic() + PULSE_SECONDS
-        while not self._closing.wait(_LOOK_SECONDS if self.warm.is_set() else 0.1):
-            if not self.warm.is_set():
-                if starting:
-                    _, starting = session.ray.wait(starting, num_returns=len(starting), timeout=0.0)
-                if not starting:
-                    self.warm.set()
+        misses, next_pulse = 0, time.monotonic() + PULSE_SECONDS
+        while not self._closing.wait(_LOOK_SECONDS):
             if not session.raylet_runs():
                 raise EvaluatorUnavailable("its raylet has died")
             now = time.monotonic()
@@ -375,8 +347,7 @@ class _Connection:
                 misses = 0 if session.head_answers() else misses + 1
                 if misses >= 3:
                     raise EvaluatorUnavailable("the head of the cluster does not answer")
-            if now >= next_look and not misses:
-                next_look = now + _LOOK_SECONDS
+            if not misses:
                 self._count(session)
             self._cancel(session)
 
@@ -407,78 +378,3 @@ def _equal(a: Shared, b: Shared) -> bool:
     except ValueError:
         # Cases with arrays have no equality.
         return False
-
-
-class AutoEvaluator:
-    """`Evaluator` that starts a local Ray in the background; for servers and runners.
-
-    Each request runs on one of the two: on Ray once it is ready, in threads before, and after a
-    loss until it is ready again. If Ray cannot be started, threads remain.
-
-    Args:
-        cpus: Number of tasks that run concurrently; all processors by default.
-    """
-
-    def __init__(self, cpus: int | None = None) -> None:
-        self._threads = InProcessEvaluator(cpus)
-        self._ray = RayEvaluator(cpus=self._threads.slots)
-        self._used: InProcessEvaluator | RayEvaluator = self._threads
-        self._without_ray = False
-        self._closed = False
-
-    @property
-    def slots(self) -> int:
-        """Number of tasks that run concurrently."""
-        return self._threads.slots
-
-    @property
-    def place(self) -> str:
-        """Place of the last evaluation."""
-        return self._used.place
-
-    @property
-    def loads(self) -> dict[str, Load]:
-        """Load of threads and Ray."""
-        return self._threads.loads | self._ray.loads
-
-    @property
-    def on_ray(self) -> bool:
-        """Whether the next request runs on Ray."""
-        if self._without_ray or self._closed:
-            return False
-        try:
-            return self._ray.is_warm()
-        except EvaluatorUnavailable as error:
-            self._do_without(error)
-            return False
-
-    def evaluate(
-        self, request: EvaluationRequest, should_stop: Callable[[], bool]
-    ) -> tuple[Outcome, ...]:
-        """Simulate on Ray if it is ready, else in threads."""
-        if self.on_ray:
-            try:
-                outcomes = self._ray.evaluate(request, should_stop)
-            except EvaluatorUnavailable as error:
-                if self._closed or not self._ray.lost:
-                    raise
-                _log.warning("%s; simulations continue in threads until it is back", error)
-            except ProvenanceChanged as error:
-                # Its processes have read files that changed after the start of this one.
-                self._do_without(error)
-            else:
-                self._used = self._ray
-                return outcomes
-        self._used = self._threads
-        return self._threads.evaluate(request, should_stop)
-
-    def close(self) -> None:
-        """End Ray and the threads. Idempotent."""
-        self._closed = True
-        self._threads.close()
-        self._ray.close()
-
-    def _do_without(self, error: Exception) -> None:
-        if not (self._without_ray or self._closed):
-            self._without_ray = True
-            _log.warning("%s; simulations continue in threads", error)

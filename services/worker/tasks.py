@@ -21,7 +21,7 @@ from gaitswarm.sim.controllers.quantisation import timing_tables
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.kernel.walk import KernelTime
 from gaitswarm.sim.outcome import Outcome
-from gaitswarm.sim.provenance import Provenance, provenance_of, simulator_digest
+from gaitswarm.sim.provenance import Provenance, provenance_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,12 +131,6 @@ def transportable(error: Exception) -> Exception:
         family = SimulationError if isinstance(error, SimulationError) else RuntimeError
         return family(f"{type(error).__name__}: {error}")
     return error
-
-
-def warm_up() -> None:
-    """Import what a simulation needs, and note the digest of the imported code."""
-    simulator_digest()
-    arithmetic_digest()
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,4 @@
-"""Simulates in threads, on Ray, perhaps loses it, and closes it at a line of its input."""
+"""Simulates on a local Ray, perhaps loses it, and closes it at a line of its input."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.worker import ray_evaluator
-from gaitswarm.services.worker.ray_evaluator import AutoEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from tests.examples.processes import eventually
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request, walked_at_once
@@ -20,30 +22,23 @@ def main() -> None:
     vars(ray_evaluator)["PULSE_SECONDS"] = 0.3
     wanted = request(20)
     expected = bits(walked_at_once(wanted))
-    evaluator = AutoEvaluator(1)
+    evaluator = RayEvaluator(cpus=1)
 
-    def evaluate(place: str) -> None:
-        assert evaluator.on_ray == (place == "ray")
-        assert bits(evaluator.evaluate(wanted, never)) == expected
-        sys.stdout.write(f"{place}\n")
-        sys.stdout.flush()
+    def evaluate() -> bool:
+        with suppress(EvaluatorUnavailable):
+            assert bits(evaluator.evaluate(wanted, never)) == expected
+            sys.stdout.write("ray\n")
+            sys.stdout.flush()
+            return True
+        return False
 
-    evaluate("threads")
-    eventually(lambda: evaluator.on_ray)
-    evaluate("ray")
+    assert evaluate()
     if "lose" in sys.argv:
         for process in descendants(os.getpid()):
             if "raylet/raylet" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
-
-        def in_threads() -> bool:
-            assert bits(evaluator.evaluate(wanted, never)) == expected
-            return not evaluator.on_ray
-
-        eventually(in_threads)
-        evaluate("threads")
-        eventually(lambda: evaluator.on_ray)
-        evaluate("ray")
+        eventually(lambda: evaluator.lost)
+        eventually(evaluate)
     sys.stdin.readline()
     os.kill(os.getpid(), signal.SIGTERM)
     if heard.wait(5.0):

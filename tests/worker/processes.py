@@ -63,7 +63,7 @@ def descendants(pid: int) -> list[Process]:
 
 def walkers(pid: int) -> list[Process]:
     """Ray's worker processes below a driver."""
-    titles = ("ray::simulate", "ray::warm_up", "ray::IDLE")
+    titles = ("ray::simulate", "ray::IDLE")
     found = []
     for candidate in descendants(pid):
         try:

@@ -106,15 +106,6 @@ def test_the_pace_blends_iterations_and_takes_the_overhead_of_a_task_that_did_no
     assert later.after([]) == later
 
 
-def test_a_chunk_is_halved_down_to_one_design_in_one_case() -> None:
-    parts = [Chunk((0, 1), 3, 6, 8.0)]
-    while any(part.halves() for part in parts):
-        parts = [half for part in parts for half in part.halves() or (part,)]
-    assert {(*part.cases, part.start, part.stop) for part in parts} == {
-        (case, design, design + 1) for case in (0, 1) for design in (3, 4, 5)
-    }
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("slots", [1, 2])
 def test_the_kernel_leaves_less_than_a_tenth_of_its_lanes_idle(slots: int) -> None:

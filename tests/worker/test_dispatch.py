@@ -36,7 +36,6 @@ class Sent:
 
     request: EvaluationRequest
     chunk: Chunk
-    attempts: int
 
     def __hash__(self) -> int:
         return id(self)
@@ -67,8 +66,8 @@ class MadeUpEngine:
     sent: list[Sent] = field(default_factory=list)
     abandoned: list[Sent] = field(default_factory=list)
 
-    def submit(self, request: EvaluationRequest, chunk: Chunk, attempts: int, /) -> Sent:
-        self.sent.append(Sent(request, chunk, attempts))
+    def submit(self, request: EvaluationRequest, chunk: Chunk, /) -> Sent:
+        self.sent.append(Sent(request, chunk))
         return self.sent[-1]
 
     def wait(self, handles: Sequence[Sent], seconds: float) -> Sequence[Sent]:
@@ -101,34 +100,20 @@ def test_lost_tasks_are_submitted_again_for_ever() -> None:
             raise TaskLost("its node")
         return task.answer()
 
-    engine = evaluated(lose_twenty_times, request(COUNT))
+    evaluated(lose_twenty_times, request(COUNT))
     assert set(losses.values()) == {21}
-    assert {task.attempts for task in engine.sent} == {3}
 
 
-def test_of_a_task_that_kills_workers_the_design_at_fault_is_found_and_named() -> None:
+def test_a_task_that_kills_workers_is_named() -> None:
     def kill(task: Sent) -> Answer:
         if 1 in task.chunk.cases and task.chunk.start <= 5 < task.chunk.stop:
             raise WorkerDied
         return task.answer()
 
     name = request(1).cases[1].name
-    engine = MadeUpEngine(kill)
-    with pytest.raises(KilledWorker, match=f"^3 worker .* same task: design 5 .* in '{name}'"):
-        Dispatcher().evaluate(engine, request(COUNT), never)
-    *_, last = [task for task in engine.sent if task.chunk.start <= 5 < task.chunk.stop]
-    assert last.attempts == 3
-    parts = [task for task in engine.sent if task.chunk.stop - task.chunk.start not in (1, COUNT)]
-    assert {task.attempts for task in parts} == {1, 3}
-
-
-def test_a_task_that_kills_workers_only_as_a_whole_is_run_in_parts() -> None:
-    def kill_large(task: Sent) -> Answer:
-        if task.chunk.stop - task.chunk.start > 3:
-            raise WorkerDied
-        return task.answer()
-
-    evaluated(kill_large, request(COUNT))
+    words = f"^3 worker .* same task: designs [0-5] to .* in '{name}'"
+    with pytest.raises(KilledWorker, match=words):
+        Dispatcher().evaluate(MadeUpEngine(kill), request(COUNT), never)
 
 
 def test_a_worker_that_computes_something_else_is_named() -> None:

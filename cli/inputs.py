@@ -82,11 +82,12 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
 def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
     """Return the spec with another search method or preset, with default settings."""
     from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
+    from gaitswarm.specs import job_spec
 
     document = spec.model_dump(mode="json")
     document["optimizer"] = with_settings(name, {"particles": spec.optimizer.particles})
     document["name"] = f"{spec.name or 'job'}, by {name}"[:200]
-    return parse_spec(document)
+    return job_spec(document)
 
 
 def check_optimizer_name(name: str, option: str) -> None:
@@ -193,21 +194,6 @@ def _with_gait(spec: AnySpec) -> AnySpec:
     extended = spec.with_gait_searched()
     extended.check_can_be_simulated()
     return extended
-
-
-def parse_spec(data: Mapping[str, Any]) -> AnySpec:
-    """Validate a spec and check that it can be simulated; errors name every invalid field."""
-    from pydantic import ValidationError
-
-    from gaitswarm.errors import invalid_request
-    from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
-
-    try:
-        spec = SPECS.validate_python(data)
-    except ValidationError as error:
-        raise invalid_request(error, AnySpec) from error
-    spec.check_can_be_simulated()
-    return spec
 
 
 def _robot(text: str | None) -> str | dict[str, Any]:

@@ -25,6 +25,7 @@ from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
 from gaitswarm.services.optimizer.search.registry import OptimizerName, OptimizerSettings
 from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.input import numbers_from_booleans
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import RobotFiles, RobotVariant
 from gaitswarm.sim.robot.variant import SHIPPED
@@ -196,7 +197,10 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
         given["start"] = file.designs
     document |= given
     try:
-        return SPECS.validate_python(document)
+        combined = SPECS.validate_python(document)
+        for where in numbers_from_booleans(document, combined.model_dump()):
+            raise InvalidRequest("must be a number", field=".".join(map(str, where)))
+        return combined
     except ValidationError as error:
         refused = invalid_request(error, AnySpec)
         raise (refused if file is None else file.located(refused)) from error

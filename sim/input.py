@@ -216,7 +216,7 @@ def numbers_from_booleans(document: Any, value: Any) -> Iterator[tuple[str | int
     pairs: Iterable[tuple[str | int, Any, Any]] = ()
     if isinstance(document, dict) and isinstance(value, dict):
         pairs = ((name, document[name], value[name]) for name in document.keys() & value.keys())
-    elif isinstance(document, list) and isinstance(value, list | tuple):
+    elif isinstance(document, list | tuple) and isinstance(value, list | tuple):
         pairs = ((i, *both) for i, both in enumerate(zip(document, value, strict=False)))
     for name, part, inner in pairs:
         for where in numbers_from_booleans(part, inner):

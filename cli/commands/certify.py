@@ -151,7 +151,8 @@ _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 
 def _certificate_spec(design: str, db: str | None, options: Mapping[str, Any]) -> CertificateSpec:
     """Return the spec of a design and options, or of an earlier certificate with options."""
-    from gaitswarm.cli.inputs import chosen_robot, parse_spec, scenario_data
+    from gaitswarm.cli.inputs import chosen_robot, scenario_data
+    from gaitswarm.specs import job_spec
 
     document = _earlier(design, db, options) or _new(design, db, options)
     document |= {name: options[name] for name in _PLAIN if name in options}
@@ -166,7 +167,7 @@ def _certificate_spec(design: str, db: str | None, options: Mapping[str, Any]) -
     if "robot" in options:
         document["robot"] = chosen_robot(options["robot"])
     document |= _perturbations(document, options)
-    return cast("CertificateSpec", parse_spec(document))
+    return cast("CertificateSpec", job_spec(document))
 
 
 def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -186,7 +186,8 @@ def identify(
 ) -> Printed:
     """Fit a robot's parameters to recorded walks in this process, and show which are reliable."""
     from gaitswarm.cli.embedded import run_seeds
-    from gaitswarm.cli.inputs import chosen_robot, parse_spec
+    from gaitswarm.cli.inputs import chosen_robot
+    from gaitswarm.specs import job_spec
 
     true_values = read_truth(truth)
     document = {
@@ -206,7 +207,7 @@ def identify(
         "iterations": iterations,
         "precision": precision or "double",
     }
-    specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
+    specs = [job_spec({**document, "seed": seed + run}) for run in range(runs)]
 
     def report(jobs: Jobs, ids: list[str]) -> Printed:
         view = jobs.parameters(ids)
@@ -465,8 +466,8 @@ def calibrate(
 ) -> Printed:
     """Fit a robot and unknown conventions to a table of results, in this process."""
     from gaitswarm.cli.embedded import run_seeds
-    from gaitswarm.cli.inputs import parse_spec
     from gaitswarm.cli.targets_file import read_targets
+    from gaitswarm.specs import job_spec
 
     document: dict[str, Any] = {
         "kind": "calibration",
@@ -486,7 +487,7 @@ def calibrate(
     }
     if variables is not None:
         document["variables"] = _variables(document, variables)
-    specs = [parse_spec({**document, "seed": seed + run}) for run in range(seeds)]
+    specs = [job_spec({**document, "seed": seed + run}) for run in range(seeds)]
     return run_seeds(
         specs,
         workers,
@@ -571,15 +572,13 @@ def _robots(text: str | None) -> dict[str, Any]:
 
 
 def _variables(document: dict[str, Any], text: str) -> list[Any]:
-    from gaitswarm.cli.inputs import parse_spec
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from gaitswarm.specs import job_spec
 
     entries = _entries(text)
     if not any("=" in entry for entry in entries):
         return entries
-    spec = cast(
-        CalibrationSpec, parse_spec({**document, "fixed": {}, "variables": None, "seed": 1})
-    )
+    spec = cast(CalibrationSpec, job_spec({**document, "fixed": {}, "variables": None, "seed": 1}))
     catalogue = {variable.name: variable for variable in spec.catalogue()}
     variables: list[Any] = []
     for entry in entries:

@@ -82,3 +82,12 @@ def test_a_design_file_may_name_choices(tmp_path: Path) -> None:
     with pytest.raises(gaitswarm.InvalidRequest, match="not one of its choices") as refused:
         read_design(str(path), "pi")
     assert refused.value.field == "design.fir_window"
+
+
+def test_a_boolean_in_place_of_a_number_is_refused() -> None:
+    document = {**SPEC, "optimizer": {"name": "pso", "particles": True}}
+    with pytest.raises(gaitswarm.InvalidRequest, match="must be a number") as refused:
+        gaitswarm.job_spec(document)
+    assert refused.value.field == "optimizer.particles"
+    with pytest.raises(gaitswarm.InvalidRequest, match="iterations: must be a number"):
+        gaitswarm.job_spec(SPEC, iterations=True)

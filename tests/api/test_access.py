@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.settings import Settings
 from tests.api.conftest import Serve
+from tests.examples.api_document import api_document
 from tests.examples.servers import Server, operations
 
 Bearer = Callable[[Scope], dict[str, str]]
@@ -71,6 +73,14 @@ def test_without_a_token_nothing_is_reported(guarded: httpx2.Client, job: Job) -
         assert answer.json()["type"] == "urn:gaitswarm:problem:unauthorized"
         assert "GAITSWARM_TOKEN" in answer.json()["detail"]
     assert guarded.post(f"/v1/jobs/{job.id}/cancel").status_code == 401
+
+
+def test_every_operation_that_documents_401_needs_a_token(guarded: httpx2.Client) -> None:
+    for path, methods in api_document()["paths"].items():
+        for method, operation in methods.items():
+            if "401" in operation["responses"]:
+                answer = guarded.request(method, re.sub(r"{\w+}", "1", path), json={"token": "no"})
+                assert answer.status_code == 401, (method, path)
 
 
 @pytest.mark.parametrize("path", ["/v1/healthz", "/v1/readyz", "/healthz", "/docs", "/v1/session"])

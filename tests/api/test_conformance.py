@@ -12,7 +12,6 @@ import schemathesis
 from fastapi.routing import APIRoute
 from hypothesis import HealthCheck, Phase, settings
 from requests import Session
-from schemathesis.config import SchemathesisConfig
 from schemathesis.core.parameters import ParameterLocation
 from schemathesis.core.result import Ok
 from schemathesis.generation.meta import CoveragePhaseData
@@ -23,7 +22,7 @@ from gaitswarm.api.app import create_app
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.settings import Settings
-from tests.api.conformance import CHECKS, Found, schema_of, sequences, served
+from tests.api.conformance import CHECKS, campaign, config
 from tests.examples.api_document import api_document
 from tests.examples.servers import Server
 
@@ -46,19 +45,9 @@ def _document() -> dict[str, Any]:
     return document
 
 
-def _config() -> SchemathesisConfig:
-    """Text of all characters but surrogates, which no codec has.
-
-    Which these are is asked of the codec otherwise, one by one: five seconds in a new checkout.
-    """
-    config = SchemathesisConfig()
-    config.projects.default.generation.codec = None
-    return config
-
-
 @cache
 def _schema() -> BaseSchema:
-    schema = schemathesis.openapi.from_dict(_document(), config=_config())
+    schema = schemathesis.openapi.from_dict(_document(), config=config())
     schema.hook(filter_case)
     return schema
 
@@ -198,17 +187,10 @@ def test_every_operation_of_the_document_is_among_them() -> None:
 
 @pytest.mark.thorough("test_every_answer_is_as_documented, one answer after another")
 @pytest.mark.slow
-def test_sequences_along_the_links_of_the_document_are_answered_as_documented() -> None:
-    """The short version of `python -m tests.api.conformance`."""
-    found = Found()
-    with served() as (server, ids):
-        schema = schema_of(server, ids)
-        # Others every time: about half of all rounds set no job going.
-        for _ in range(30):
-            sequences(schema, server.url, found, 60)
-            seen = {status for _, status in found.answers}
-            # Some have followed a job that they had submitted, or found.
-            if {200, 202, 409} <= seen:
-                break
-    assert found.failures == {}
-    assert {200, 202, 409} <= seen
+def test_ten_minutes_of_requests_and_sequences_are_answered_as_documented() -> None:
+    found = campaign(cases=1000, seed=1, minutes=10.0)
+    assert (found.failures, found.tracebacks) == ({}, [])
+    statuses = {status for _, status in found.answers}
+    # Some have followed a job that they had submitted, or found.
+    assert {200, 202, 409} <= statuses
+    assert max(statuses) < 500

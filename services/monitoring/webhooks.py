@@ -14,10 +14,10 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Collection
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, suppress
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import httpx2
 
@@ -41,6 +41,8 @@ _POLL_SECONDS: Final = 1.0
 _STORE_PAUSE: Final = 10.0
 """Pause after a failure of the store [s]."""
 
+T = TypeVar("T")
+
 _log = logging.getLogger(__name__)
 
 
@@ -58,6 +60,23 @@ def _key(secret: str) -> bytes:
         except binascii.Error:
             pass
     return secret.encode()
+
+
+class _Daemons(ThreadPoolExecutor):
+    """Makes each call in a daemon thread: no stop waits for a host's address that is not found."""
+
+    def submit(self, call: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        future = Future[T]()
+        future.set_running_or_notify_cancel()
+
+        def run() -> None:
+            try:
+                future.set_result(call(*args, **kwargs))
+            except BaseException as error:  # noqa: BLE001 - raised where the result is awaited
+                future.set_exception(error)
+
+        threading.Thread(target=run, name="notification", daemon=True).start()
+        return future
 
 
 class Notifier:
@@ -88,8 +107,7 @@ class Notifier:
             self._thread.join()
 
     def _run(self) -> None:
-        # A slow lookup of a host's address occupies a thread of the executor.
-        self._loop.set_default_executor(ThreadPoolExecutor(_AT_ONCE + 1, "notifier"))
+        self._loop.set_default_executor(_Daemons())
         with closing(self._loop):
             self._loop.run_until_complete(self._send())
 

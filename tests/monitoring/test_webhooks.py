@@ -6,6 +6,8 @@ import base64
 import hashlib
 import hmac
 import signal
+import socket
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -148,6 +150,34 @@ def test_an_attempt_ends_at_its_deadline_however_slowly_the_receiver_answers(
     (waiting,) = store.outbox.about(slow)
     assert waiting.error == "the receiver did not answer within 0.5 s"
     assert waiting.next_attempt_at is not None
+
+
+def test_a_host_whose_address_is_never_found_delays_neither_others_nor_the_stop(
+    store: Store, receiver: Receiver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lookup, answers, waiting = socket.getaddrinfo, threading.Event(), list[threading.Thread]()
+
+    def resolve(host: Any, *args: Any, **options: Any) -> Any:
+        if "silent.example" in str(host):
+            waiting.append(threading.current_thread())
+            answers.wait(60.0)
+        return lookup(host, *args, **options)
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+    monkeypatch.setattr("gaitswarm.services.monitoring.webhooks._AT_ONCE", 2)
+    monkeypatch.setattr("gaitswarm.services.monitoring.webhooks._DEADLINE", 0.1)
+    try:
+        silent = [cancelled(store, "http://silent.example/") for _ in range(4)]
+        with notifying(store, receiver, hosts=(receiver.host, "silent.example")):
+            eventually(lambda: all(store.outbox.about(job)[0].attempts for job in silent))
+            prompt = cancelled(store, receiver.url)
+            eventually(lambda: store.outbox.about(prompt)[0].delivered_at is not None)
+            stopped = time.monotonic()
+        assert time.monotonic() - stopped < 5.0
+        # The end of the process waits for threads that are no daemons.
+        assert len(waiting) == 4 and all(thread.daemon for thread in waiting)
+    finally:
+        answers.set()
 
 
 def test_pauses_grow_to_an_hour_and_end() -> None:

@@ -274,7 +274,11 @@ class DiskError(Fault):
 
 
 class FileReplaced(Fault):
-    """The SQLite file is moved away, half of the time with another in its place, and put back."""
+    """The SQLite file is moved away, half of the time with another in its place, and put back.
+
+    It is open in all processes: one that starts meanwhile takes the other file for its database,
+    and has to be started again.
+    """
 
     name = "file-replaced"
     shortest, longest = 1.0, 4.0
@@ -284,6 +288,8 @@ class FileReplaced(Fault):
         return deployment.server is None
 
     def inject(self) -> None:
+        while not all(map(self._has_opened, [self.deployment.api, *self.deployment.runners])):
+            time.sleep(0.05)
         for file in self._files():
             with suppress(FileNotFoundError):
                 file.rename(self._away(file))
@@ -296,6 +302,13 @@ class FileReplaced(Fault):
         for file in self._files():
             with suppress(FileNotFoundError):
                 self._away(file).rename(file)
+
+    def _has_opened(self, service: Service) -> bool:
+        try:
+            files = [str(file.readlink()) for file in Path(f"/proc/{service.pid}/fd").iterdir()]
+        except OSError:
+            return False
+        return self.deployment.url in files
 
     def _files(self) -> list[Path]:
         return [Path(self.deployment.url + end) for end in ("", "-wal", "-shm")]

@@ -129,6 +129,7 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
         ApiServer(app, Settings(api_port=taken.getsockname()[1]))
 
 
+@pytest.mark.thorough("every module in a fresh process")
 @pytest.mark.slow
 def test_views_need_no_web_framework_and_the_api_neither_ray_nor_a_database_nor_scipy() -> None:
     statements = (

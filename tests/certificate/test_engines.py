@@ -155,6 +155,7 @@ def test_under_the_runner_our_rows_have_the_bits_of_a_certificate_without_engine
     assert max(abs(compared.difference or 0.0) for compared in objectives.values()) < 0.02
 
 
+@pytest.mark.thorough("test_they_are_verified_with_the_job")
 @pytest.mark.slow
 def test_evidence_is_verified_without_the_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

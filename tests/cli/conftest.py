@@ -66,6 +66,18 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     return Finished(db, result.json)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave most tests on a server to `make test-all`."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.parent != here or item.path.stem == "test_job_commands":
+            continue
+        parameters = getattr(item, "callspec", None)
+        if parameters is not None and parameters.params.get("place") == "server":
+            item.add_marker(pytest.mark.thorough("the same over HTTP"))
+
+
 @pytest.fixture(params=["database", "server"])
 def place(
     request: pytest.FixtureRequest, serve_database: Callable[[Path], str]

@@ -70,6 +70,7 @@ def history(job: Finished, gaitswarm: Gaitswarm) -> Any:
     return gaitswarm("history", job.id, "--db", job.db, "--json").json
 
 
+@pytest.mark.thorough("test_a_job_whose_numbers_would_be_others_is_refused_until_that_is_accepted")
 @pytest.mark.variants
 @pytest.mark.parametrize(
     ("change", "said"),

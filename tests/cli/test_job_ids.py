@@ -100,7 +100,17 @@ def measured(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
-@pytest.mark.variants(without=("plot front", "plot surface"))
+@pytest.mark.variants(
+    "best",
+    "cancel",
+    "delete",
+    "fork",
+    "list",
+    "optimize",
+    "simulate",
+    "submit",
+    "verify",
+)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_it_is_enough_wherever_a_command_takes_an_id(
     gaitswarm: Gaitswarm, finished: Finished, measured: Path, tmp_path: Path, name: str

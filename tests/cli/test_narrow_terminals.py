@@ -46,6 +46,7 @@ def jobs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     return db, [first.json["id"], *others]
 
 
+@pytest.mark.variants("list", "status ID", "history ID", "optimizers")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_narrow_terminals_show_the_same_words_as_wide_ones(
     gaitswarm: Gaitswarm,

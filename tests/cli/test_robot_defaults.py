@@ -43,6 +43,7 @@ def test_a_design_is_judged_as_a_job_of_the_folder_judges_it(dog: Path, tmp_path
     assert other["fitness"] != again["fitness"]
 
 
+@pytest.mark.thorough("test_the_robot_of_a_log_is_that_of_its_validation_by_default")
 @pytest.mark.slow
 def test_walks_that_are_compared_with_logs_take_the_folders_controller(
     dog: Path, tmp_path: Path

@@ -88,6 +88,7 @@ def test_a_notebook_runs_and_holds_no_outputs(notebook: Path, reader: Reader) ->
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)
 
 
+@pytest.mark.thorough("test_the_readmes_python_runs, with the page about the library")
 def test_the_page_about_the_library_runs(reader: Reader) -> None:
     reader.read("docs/library.md")
     for picture in ("height.png", "job.png", "server.png"):

@@ -51,6 +51,7 @@ class Earlier(JobService):
         return replace(job, state=JobState.RUNNING, progress=progress)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_evidence_of_a_job_that_continues_meanwhile_is_of_what_was_committed(
     precision: Precision, tmp_path: Path

@@ -236,6 +236,7 @@ def test_a_fork_that_was_judged_by_another_preference_is_verified_but_for_the_wa
     assert search.passed is None and "judged by another preference" in search.detail
 
 
+@pytest.mark.thorough("test_untouched_evidence_is_verified_in_all_it_says")
 def test_a_fuzzy_design_and_a_robot_of_ones_own_can_be_proved(tmp_path: Path) -> None:
     from tests.examples.paths import QUADRUPED
 

@@ -24,7 +24,7 @@ TRAPPING = "CFLAGS=-O1 -fsanitize=undefined -fsanitize-undefined-trap-on-error"
 PID = {"P": 0.4, "I": 0.1, "D": 0.003}
 
 
-@pytest.mark.variants("A", "fuzzy-pso-ps", "pid")
+@pytest.mark.variants("fuzzy-pso-ps")
 @pytest.mark.parametrize(
     ("controller", "design", "robot"),
     [
@@ -82,6 +82,7 @@ def test_every_sample_equals_the_simulators_on_other_robots(
     assert tested.compared[-1][2] == 0
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize(
     ("controller", "name"), [("fuzzy-pi", "A"), ("fuzzy-pi-3", "fuzzy-pso-ps")]
 )
@@ -102,6 +103,7 @@ def test_walks_by_a_coarser_table_are_repeated_too(
     assert all(share is not None and 0.0 < share < 0.5 for share in view.table_difference.values())
 
 
+@pytest.mark.thorough("test_a_changed_gain_is_detected")
 def test_a_changed_cell_that_walks_visit_changes_their_samples(copy_of_a: Path) -> None:
     # No error and no current: every walk begins there.
     with_changed_cell(copy_of_a, 512 * 64)
@@ -126,6 +128,7 @@ def test_a_changed_gain_is_detected(copy_of_a: Path) -> None:
     assert tested.compared[-1][2] > 0
 
 
+@pytest.mark.thorough("test_a_changed_gain_is_detected")
 def test_a_changed_trajectory_is_detected(copy_of_a: Path) -> None:
     path = copy_of_a / "trajectories.c"
     replaced(path, '{"normal-fast", rows_0, 755, 5, 6', '{"normal-fast", rows_0, 755, 4, 6')
@@ -135,6 +138,7 @@ def test_a_changed_trajectory_is_detected(copy_of_a: Path) -> None:
     assert "desired angles compared, 0 differing" not in tested.out
 
 
+@pytest.mark.thorough("test_a_changed_gain_is_detected")
 def test_a_truncated_walk_fails(copy_of_a: Path) -> None:
     path = copy_of_a / "test" / "walks" / "slope-fast.walk"
     path.write_bytes(path.read_bytes()[:-1])

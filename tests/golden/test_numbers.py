@@ -94,6 +94,7 @@ def test_the_demos_search_begins_as_it_did(backend: Backend) -> None:
     assert [len(iteration.fitness) for iteration in iterations] == [10] * ITERATIONS
 
 
+@pytest.mark.thorough("test_a_walk_has_the_same_bits_at_every_vector_width")
 @pytest.mark.variants("AVX2")
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -118,6 +119,7 @@ def test_a_machine_with_narrower_vectors_gives_the_same_bits(
     assert found == {name: GOLDEN.optimum[name] for name in NARROWLY_WALKED}
 
 
+@pytest.mark.thorough("test_compiled_and_readable_kernel_agree")
 @pytest.mark.slow
 def test_the_reference_kernel_agrees_to_1e_9() -> None:
     (scenario,) = (scenario for scenario in SCENARIOS if scenario.name == "turn-right-fast")

@@ -101,6 +101,22 @@ def portal() -> Iterator[BlockingPortal]:
 Reach = Callable[[Path], gaitswarm.Jobs]
 
 
+_IN_DATABASES = {"test_deletion", "test_fork", "test_labels", "test_priority"}
+"""Modules that `make test` runs on a database of this process too, which commands use as well."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave most tests on a database to `make test-all`."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.parent != here or item.path.stem in _IN_DATABASES:
+            continue
+        parameters = getattr(item, "callspec", None)
+        if parameters is not None and parameters.params.get("reach") == "database":
+            item.add_marker(pytest.mark.thorough("the same without a server"))
+
+
 # Either way comes blocking and as coroutines, which are made of the same: one of each is enough for
 # `make test`.
 @pytest.fixture(

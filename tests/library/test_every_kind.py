@@ -101,6 +101,7 @@ def _recording(jobs: DatabaseJobs) -> str:
     return jobs.record(record(pair, scenario, "fuzzy-pi", PUBLISHED_A)).id
 
 
+@pytest.mark.variants("tuning", "tuning-over-worlds-for-a-front", "calibration")
 def test_every_format_of_export_has_a_row_for_each_evaluation(
     jobs: DatabaseJobs, ended: JobView
 ) -> None:
@@ -130,6 +131,7 @@ def test_a_job_that_has_committed_nothing_has_a_table_without_rows(
     assert pq.read_table(io.BytesIO(parquet)).num_rows == 0
 
 
+@pytest.mark.variants("tuning", "tuning-over-worlds-for-a-front", "certificate", "identification")
 def test_evidence_and_stored_history_are_verified(jobs: DatabaseJobs, ended: JobView) -> None:
     evidence = gaitswarm.verify(jobs.evidence(ended.id), replay=2, seed=1)
     assert evidence.verified, evidence

@@ -110,6 +110,7 @@ def test_a_walk_is_the_same_in_mujoco_to_rounding(
     np.testing.assert_allclose(trace.objectives, objectives, rtol=1e-8)
 
 
+@pytest.mark.thorough("test_a_walk_is_the_same_in_mujoco_to_rounding")
 @pytest.mark.variants
 @pytest.mark.parametrize("variant", [PLAIN, KARNOPP, STICK, LOOSE], ids=named)
 def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(

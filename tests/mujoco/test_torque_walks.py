@@ -31,6 +31,7 @@ def test_a_walk_is_worth_the_same_in_mujocos_own_steps(controller: str) -> None:
     assert np.isfinite(log.current).all()
 
 
+@pytest.mark.thorough("test_a_walk_is_worth_the_same_in_mujocos_own_steps")
 def test_an_inner_rate_that_divides_no_usual_step_is_kept() -> None:
     """At 1500 Hz MuJoCo's steps are 6 kHz, and 81 kHz where a foot may come down."""
     files = torque_quadruped_files(rate=1500)

@@ -58,6 +58,7 @@ def test_a_minimum_in_a_corner_is_reached_to_the_bit() -> None:
     assert (asked == BOX.low).all(axis=1).any()
 
 
+@pytest.mark.thorough("test_a_minimum_in_a_corner_is_reached_to_the_bit")
 def test_a_minimum_along_a_bound_does_not_stop_the_other_variables() -> None:
     """However long two variables lie at their bounds, the rest converges."""
 
@@ -98,6 +99,7 @@ def test_a_product_is_summed_in_order_and_little_of_it_is_held_at_once(rows: int
     assert peak < 50_000_000
 
 
+@pytest.mark.thorough("test_a_variable_never_stops_trying_other_integers_and_choices")
 def test_integers_and_choices_are_found_with_the_rest() -> None:
     calls = [
         calls_to(1e-2, designs_asked("cma-es", MIXED, mixed_bowl, 2_500, seed), mixed_bowl)

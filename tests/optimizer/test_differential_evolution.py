@@ -179,6 +179,7 @@ def test_an_impossible_state_is_refused(field: str, value: object) -> None:
         optimizer.load(optimizer.dump() | {field: value})
 
 
+@pytest.mark.thorough("test_a_member_is_replaced_by_a_trial_that_is_no_worse_and_by_no_other")
 def test_a_bowl_with_an_integer_is_solved_in_2500_evaluations() -> None:
     found = [best_of(search(budget=2_500, seed=seed)) for seed in range(5)]
     by_swarm = [best_of(ParticleSwarm(PsoSettings(), MIXED, 2_500, seed)) for seed in range(5)]

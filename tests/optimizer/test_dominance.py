@@ -38,6 +38,7 @@ def test_it_is_what_the_definition_says(
         assert non_dominated(points).tolist() == by_definition(points).tolist()
 
 
+@pytest.mark.thorough("test_it_is_what_the_definition_says")
 def test_thousands_of_points_agree_with_the_definition() -> None:
     points = np.random.default_rng(1).integers(0, 30, (3000, 5)).astype(np.float64)
     assert non_dominated(points).tolist() == by_definition(points).tolist()

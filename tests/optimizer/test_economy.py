@@ -133,6 +133,7 @@ def test_a_start_from_an_earlier_job_is_not_walked_again(store: Store) -> None:
     assert (walked, job.progress.evaluations_saved) == (SPEC.budget - 1, 1)
 
 
+@pytest.mark.variants("scenarios", "precision")
 @pytest.mark.parametrize(
     "given",
     [
@@ -149,6 +150,7 @@ def test_walks_of_another_kind_are_not_shared(store: Store, given: dict[str, Any
     assert walked >= SPEC.budget
 
 
+@pytest.mark.variants("code")
 @pytest.mark.parametrize(
     "change",
     [{"code_digest": "other"}, {"robot_digest": "other"}, {"backend": "reference"}],

@@ -66,7 +66,7 @@ def objectives(store: Store, job: Job, iterations: int) -> list[bytes]:
     return [row.design.tobytes() + row.objectives.tobytes() for row in rows]
 
 
-@pytest.mark.variants("3-*")
+@pytest.mark.variants("3-pso", "3-hype")
 @pytest.mark.parametrize("method", ["pso", "hype", *REPLAYED])
 @pytest.mark.parametrize("iteration", [1, 3, 6])
 def test_a_fork_with_the_same_settings_continues_bit_for_bit_as_its_parent(
@@ -170,6 +170,7 @@ def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store:
     assert history(store, run(store, fork(store, job, 8)).id) == history(store, job.id)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("method", ["pso", "random"])
 def test_another_preference_rejudges_the_history_and_the_search(store: Store, method: str) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES})
@@ -208,6 +209,7 @@ def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
     assert [f is not None for f in state["best_fitness"]] == finite.tolist()
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("method", ["de", "cma-es"])
 def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_preference(
     store: Store, method: str
@@ -226,6 +228,7 @@ def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_pr
     assert run(store, forked).progress.evaluations == job.spec.budget
 
 
+@pytest.mark.variants("scenarios", "method")
 @pytest.mark.parametrize(
     ("given", "reason"),
     [
@@ -268,6 +271,7 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
     assert other is not None and "in double" in other.reason
 
 
+@pytest.mark.variants("given0-*", "given4-*")
 @pytest.mark.parametrize(
     ("given", "field"),
     [

@@ -135,6 +135,7 @@ def memory_of_one(store: Store, job: Job) -> int:
     return cache.nbytes
 
 
+@pytest.mark.thorough("test_the_job_asked_about_longest_ago_is_dropped_first")
 def test_many_jobs_in_many_threads_stay_within_the_bound(store: Store) -> None:
     jobs = jobs_with_history(store, 12)
     bound = 3 * memory_of_one(store, jobs[0])

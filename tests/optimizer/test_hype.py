@@ -165,6 +165,9 @@ def test_choices_and_integers_of_a_front_are_all_found() -> None:
     assert max(best.values()) < 0.05
 
 
+@pytest.mark.thorough(
+    "test_whole_fronts_stay_as_long_as_there_is_room_and_failures_last, until a search converges"
+)
 def test_a_converged_population_is_given_up_for_a_new_one() -> None:
     optimizer, extents = search(LINE, population=6, offspring=6), [1.0]
     while optimizer.evaluations < 3_000:

@@ -63,6 +63,7 @@ def test_it_is_the_volume_of_the_union_after_each_point(
     np.testing.assert_allclose(hypervolume_curve(points)[0], expected, atol=1e-12)
 
 
+@pytest.mark.thorough("test_it_is_the_volume_of_the_union_after_each_point")
 def test_a_front_of_hundreds_agrees_with_points_drawn_at_random() -> None:
     points = sphere(300, seed=3)
     drawn = np.random.default_rng(4).random((40_000, 5))

@@ -102,6 +102,7 @@ def test_the_path_depends_on_no_preference_and_the_best_is_the_one_by_the_jobs(
     assert jobs["A"].progress.best_fitness != jobs["C"].progress.best_fitness
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_a_job_killed_after_every_iteration_equals_one_that_never_was(
     store: Store, precision: str

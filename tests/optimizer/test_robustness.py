@@ -72,6 +72,7 @@ def test_units_of_objectives_and_variables_do_not_matter() -> None:
     assert found.index.value == pytest.approx(np.linalg.norm(SLOPES))
 
 
+@pytest.mark.thorough("test_noise_alone_is_no_sensitivity")
 def test_the_interval_covers_the_index_of_a_noisy_function() -> None:
     true = float(np.linalg.norm(SLOPES))
     covered = []

@@ -235,6 +235,7 @@ def kernel_not_stored() -> Exception:
     return error
 
 
+@pytest.mark.variants("OSError*", "MemoryError*", "KernelBuildError*")
 @pytest.mark.parametrize(
     "error",
     [

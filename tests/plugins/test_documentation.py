@@ -33,6 +33,7 @@ def path(site: Path) -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join(map(str, (ROOT, site)))}
 
 
+@pytest.mark.thorough("test_its_commands_run, with the contract suites")
 def test_its_package_keeps_to_the_contracts(site: Path, path: dict[str, str]) -> None:
     options = ("-q", "-p", "no:cacheprovider", "--rootdir", site)
     environment = path | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}

@@ -56,6 +56,7 @@ def sound(site: Path) -> None:
     install(site, "sound-search", places, method("sound", "sound_search"))
 
 
+@pytest.mark.variants("no_such_module", "leaving")
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_plug_in_is_left_out_with_its_distribution_and_the_reason(
     site: Path, name: str, caplog: pytest.LogCaptureFixture

@@ -52,9 +52,7 @@ def run(db: Path, *options: object) -> Any:
     return gaitswarm("optimize", "--db", db, "--evaluator", "in-process", *options)
 
 
-@pytest.mark.thorough(
-    "test_its_package_keeps_to_the_contracts", "test_a_job_of_it_is_resumed_to_the_same_bits"
-)
+@pytest.mark.thorough("test_a_job_of_it_is_resumed_to_the_same_bits")
 def test_it_keeps_to_the_contract_of_cases(mujoco_case: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", EXAMPLE,

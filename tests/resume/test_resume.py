@@ -199,6 +199,9 @@ def test_a_job_of_any_method_killed_in_its_middle_equals_one_never_killed(
         assert walked(store, killed) == walked(store, whole), name
 
 
+@pytest.mark.thorough(
+    "test_a_job_that_is_extended_twice_has_the_same_bits_however_often_it_is_killed"
+)
 def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
     store: Store, url: str, evaluator: Evaluator
 ) -> None:
@@ -232,6 +235,7 @@ def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     assert walked(store, job_id) == alone
 
 
+@pytest.mark.thorough("test_a_runner_runs_jobs_side_by_side_to_the_bits_of_jobs_run_alone")
 def test_two_jobs_at_once_equal_the_same_jobs_run_alone(
     store: Store, evaluator: Evaluator, alone: Walked
 ) -> None:

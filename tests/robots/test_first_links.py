@@ -58,6 +58,7 @@ def test_a_robot_on_a_world_is_the_robot(
     assert made.job == free.job
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("kind", ["floating", "fixed"])
 @pytest.mark.parametrize("above", [0.5, -0.3])
 def test_a_robot_on_a_world_is_read_as_pinocchio_reads_it_and_stands(

@@ -195,6 +195,7 @@ def test_torque_actuators_have_the_urdfs_limits_and_a_design_space_that_fits_the
     assert feed_forward == "feed_forward"
 
 
+@pytest.mark.variants("quasi-direct drives", "hexapod of DC motors")
 @pytest.mark.parametrize(
     ("urdf", "kind"),
     [

@@ -52,7 +52,7 @@ def warnings_of(urdf: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     ]
 
 
-@pytest.mark.variants(without="negative off the diagonal")
+@pytest.mark.variants
 @pytest.mark.parametrize(
     ("urdf", "link", "said"),
     [
@@ -73,6 +73,7 @@ def test_init_and_check_warn_of_impossible_inertia_by_line(
         assert re.match(rf"robot\.urdf, line {line}: link .*{said}", found[0]), found
 
 
+@pytest.mark.thorough("test_init_and_check_warn_of_impossible_inertia_by_line")
 def test_a_part_of_a_body_is_named_only_where_the_whole_is_wrong(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -114,6 +114,7 @@ def options_of_ray(words: list[str], command: str) -> list[str]:
     return words[3:] if is_node else []
 
 
+@pytest.mark.thorough("Ray's command line in a process of its own")
 @pytest.mark.variants
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["start", "health-check"])

@@ -103,6 +103,7 @@ def run_in(folder: Path, installed: Path, *command: str) -> subprocess.Completed
     )
 
 
+@pytest.mark.thorough("a wheel, built with its kernels")
 def test_the_wheel_has_one_top_level_package(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -116,6 +117,7 @@ def test_the_wheel_has_one_top_level_package(wheel: Path) -> None:
         assert f"gaitswarm/{built}" in names
 
 
+@pytest.mark.thorough("an installed wheel")
 def test_library_and_command_work_next_to_modules_of_the_same_names(
     installed: Path, crowded: Path
 ) -> None:
@@ -131,6 +133,7 @@ def test_library_and_command_work_next_to_modules_of_the_same_names(
     assert '"objectives"' in simulated.stdout
 
 
+@pytest.mark.thorough("test_a_checksum_is_as_sha256sum_writes_it, in a wheel")
 def test_every_library_of_a_wheel_has_its_checksum(installed: Path) -> None:
     files = {
         path.name for path in (installed / "gaitswarm" / "sim" / "compiler" / "prebuilt").iterdir()
@@ -170,6 +173,7 @@ def test_a_machine_without_a_compiler_walks_on_the_wheels_kernels(
     assert done.stdout.startswith("native ")
 
 
+@pytest.mark.thorough("test_without_a_compiler_the_interpreter_runs_with_a_warning, from a wheel")
 def test_a_robot_whose_kernel_the_wheel_does_not_bring_walks_on_the_interpreter(
     installed: Path, tmp_path: Path
 ) -> None:
@@ -178,6 +182,9 @@ def test_a_robot_whose_kernel_the_wheel_does_not_bring_walks_on_the_interpreter(
     assert "no C compiler found" in done.stderr
 
 
+@pytest.mark.thorough(
+    "test_a_damaged_library_without_a_compiler_is_refused_with_the_remedy, from a wheel"
+)
 def test_a_damaged_kernel_of_a_wheel_is_refused_with_the_remedy(
     installed: Path, tmp_path: Path
 ) -> None:

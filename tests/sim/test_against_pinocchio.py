@@ -126,6 +126,7 @@ def same(ours: Floats | float, theirs: Floats | float) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.variants("szabadka2")
 def test_every_link_is_where_pinocchio_has_it(
     oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
 ) -> None:

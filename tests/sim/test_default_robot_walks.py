@@ -41,6 +41,7 @@ def load_on_swinging_feet(robot: Robot, scenario: Scenario) -> float:
     return float(weight[swinging].sum() / weight.sum())
 
 
+@pytest.mark.thorough("test_on_the_level_the_default_robots_short_soft_soles_cost_speed")
 def test_feet_on_short_soft_soles_drag_while_they_swing() -> None:
     """They sink, so that a foot which goes forward still carries."""
     robot = load_robot(DEFAULT_ROBOT)
@@ -65,6 +66,7 @@ def velocities(log: WalkLog) -> tuple[Floats, Floats]:
     return np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("turn", [0.5, 0.0, -0.5])
 def test_the_default_robot_drifts_to_its_right_which_is_no_distance(turn: float) -> None:
     result = walk(TURN.model_copy(update={"turn": turn}), log=True)
@@ -82,6 +84,7 @@ def test_the_drift_comes_from_soles_of_different_friction() -> None:
     assert abs(aside.mean()) < 0.04 * ahead.mean()
 
 
+@pytest.mark.thorough("test_a_turn_bends_to_its_side_and_distance_follows_the_heading")
 def test_a_turn_bends_the_default_robots_way_to_either_side_of_what_is_straight_on() -> None:
     right, straight, left = (
         heading(logged_walk(TURN.model_copy(update={"turn": turn})))[-1]

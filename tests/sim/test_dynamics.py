@@ -28,6 +28,7 @@ def model(robot: Robot) -> PhysicsModel:
     return physics_model(robot)
 
 
+@pytest.mark.variants("szabadka2", "turned quadruped")
 def test_accelerations_agree_with_pinocchio_in_random_states(
     robot: Robot, model: PhysicsModel
 ) -> None:

@@ -241,6 +241,7 @@ def test_scenarios_and_robots_whose_legs_move_alike_share_a_trajectory(robot: Ro
     assert not desired_angles(robot, level).columns.flags.writeable
 
 
+@pytest.mark.variants("*turn*", "*fir_window*", "*curve*")
 @pytest.mark.parametrize(
     "change",
     [

@@ -46,6 +46,7 @@ def walk(designs: np.ndarray, scenario: Scenario = SHORT) -> np.ndarray:
     return simulate(scenario, "fuzzy-pi", NAMES, designs, backend="native").outcome.objectives
 
 
+@pytest.mark.variants("loaded-fast", "slope-fast", "turn-right-fast")
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_compiled_and_readable_kernel_agree(scenario: Scenario) -> None:
     brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.5})

@@ -83,7 +83,7 @@ def kernel_and_coding(
     return kernel, control_steps(robot)[0]
 
 
-@pytest.mark.variants(without=("stick-single", "karnopp-single"))
+@pytest.mark.variants("linear_zone-double", "backlash-single")
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
@@ -231,6 +231,7 @@ def test_lanes_that_a_call_leaves_free_take_over_walks_of_another_thread() -> No
     assert any(taken_over(kernel, coding, log=False) for _ in range(20))
 
 
+@pytest.mark.thorough("test_lanes_that_a_call_leaves_free_take_over_walks_of_another_thread")
 @pytest.mark.slow
 def test_a_call_takes_over_no_walks_of_calls_that_came_after_its_own_walks_had_ended() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
@@ -255,6 +256,7 @@ def test_a_call_takes_over_no_walks_of_calls_that_came_after_its_own_walks_had_e
     assert any(takes_over_of_the_earlier_alone() for _ in range(3))
 
 
+@pytest.mark.thorough("test_lanes_that_a_call_leaves_free_take_over_walks_of_another_thread")
 def test_walks_with_logs_are_not_delayed_by_others() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
     assert [taken_over(kernel, coding, log=True) for _ in range(3)] == [0, 0, 0]

@@ -76,6 +76,7 @@ def without_checksum(library: Path) -> None:
 DAMAGES = pytest.mark.parametrize("damage", [emptied, halved, edited, without_checksum])
 
 
+@pytest.mark.variants("halved")
 @DAMAGES
 def test_a_damaged_library_is_built_again(cache: Path, damage: Callable[[Path], None]) -> None:
     library = built(cache)
@@ -86,6 +87,7 @@ def test_a_damaged_library_is_built_again(cache: Path, damage: Callable[[Path], 
     assert library.read_bytes() == sound
 
 
+@pytest.mark.variants("edited")
 @DAMAGES
 def test_a_damaged_library_without_a_compiler_is_refused_with_the_remedy(
     cache: Path, damage: Callable[[Path], None]
@@ -378,6 +380,7 @@ def test_a_user_without_a_home_has_the_private_cache(
     built(tmp_path / f"gaitswarm-{os.getuid()}")
 
 
+@pytest.mark.variants("'a/b'", "'../../up'")
 @pytest.mark.parametrize("name", ["a/b", "../../up", "[*]", "nul\0", "", "ü" * 300], ids=ascii)
 def test_any_robot_name_makes_a_valid_file_name(cache: Path, name: str) -> None:
     library = load_library(name, b"", lambda: SOURCE)

@@ -104,6 +104,7 @@ def walked(robot: Robot, backend: Backend = "auto") -> Simulation:
     return simulate(BRIEF, "pi", list(PI), values, robot=robot, backend=backend)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("convention", get_args(EnergyConvention))
 def test_kernels_agree_on_measurements_under_every_convention(
     robot: Robot, convention: EnergyConvention

@@ -104,6 +104,7 @@ def test_without_a_compiler_the_interpreter_runs_with_a_warning(tmp_path: Path) 
     assert "no C compiler found" in done.stderr
 
 
+@pytest.mark.thorough("test_the_interpreter_has_double_precision_alone, without a compiler")
 def test_without_a_compiler_single_precision_is_refused_rather_than_computed_in_double(
     tmp_path: Path,
 ) -> None:
@@ -229,6 +230,9 @@ thread.join()
 """
 
 
+@pytest.mark.thorough(
+    "test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_not_stopped"
+)
 def test_a_kernel_loads_while_another_one_is_compiled(tmp_path: Path) -> None:
     started, gate = tmp_path / "started", tmp_path / "gate"
     gated = _compiler_that(
@@ -299,6 +303,7 @@ for name in ["unchanged", *sys.argv[1:]]:
 """
 
 
+@pytest.mark.thorough("test_a_source_is_derived_without_the_files_that_its_identity_leaves_out")
 def test_an_identity_changes_with_every_file_that_generates_a_source(
     tmp_path: Path,
 ) -> None:

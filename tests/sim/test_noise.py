@@ -58,6 +58,7 @@ def test_a_displaced_angle_is_a_turn_of_the_gearhead_against_its_shaft(
     np.testing.assert_allclose(np.array(observed[2]).ravel(), expected, rtol=1e-9)
 
 
+@pytest.mark.thorough("test_compiled_and_readable_kernel_agree, with noise")
 @pytest.mark.variants
 @pytest.mark.parametrize("link", [1, 2, 3])
 def test_kernels_agree_on_noisy_angles_which_cost_torque(link: int, elastic: Robot) -> None:

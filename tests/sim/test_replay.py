@@ -135,6 +135,7 @@ def test_the_bodys_acceleration_is_the_objectives(robot: Robot) -> None:
     assert logged_share_of_the_acceleration(robot) == pytest.approx(1.0, rel=0.03)
 
 
+@pytest.mark.thorough("test_a_sole_touches_the_ground_where_there_is_force")
 def test_touch_downs_on_the_default_robots_dampers_are_shorter_than_the_logs_ticks() -> None:
     """Up to 2270 N s/m; with 150 N s/m under the same robot the log sees them."""
     default = load_robot(DEFAULT_ROBOT)

@@ -32,6 +32,7 @@ def test_friction_at_the_joint_is_the_outputs_times_the_bevels_ratio(robot: Robo
     assert not robot.has_static_friction
 
 
+@pytest.mark.variants("0.25", "-1.0")
 @pytest.mark.parametrize("rate", [0.0, 0.25, -0.5, 1.0, -1.0, 20.0])
 def test_it_is_linear_in_a_narrow_zone_and_full_against_the_motion_beyond(
     robot: Robot, rate: float

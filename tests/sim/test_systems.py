@@ -159,6 +159,7 @@ main()
 """
 
 
+@pytest.mark.thorough("test_without_a_compiler_the_interpreter_runs_with_a_warning, without POSIX")
 @pytest.mark.slow
 def test_without_posix_and_a_compiler_the_interpreter_runs_with_a_warning() -> None:
     elsewhere, here = (
@@ -173,7 +174,7 @@ def test_without_posix_and_a_compiler_the_interpreter_runs_with_a_warning() -> N
 
 @pytest.mark.slow
 @pytest.mark.thorough(
-    "test_without_posix_and_a_compiler_the_interpreter_runs_with_a_warning, as a job"
+    "test_without_a_compiler_the_interpreter_runs_with_a_warning, as a job without POSIX"
 )
 def test_without_posix_a_job_is_optimized_in_this_process(tmp_path: Path) -> None:
     brief = tmp_path / "brief.json"

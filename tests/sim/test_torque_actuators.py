@@ -57,6 +57,7 @@ def setup_of(robot: Robot, law: ControlLaw) -> WalkSetup:
     return plan(law)
 
 
+@pytest.mark.variants("joint-pd", "fuzzy-pi")
 @pytest.mark.parametrize("controller", DRIVES)
 def test_every_controller_walks_and_both_kernels_agree(controller: str) -> None:
     design = DRIVES[controller]
@@ -74,7 +75,7 @@ def test_every_controller_walks_and_both_kernels_agree(controller: str) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.variants(without="{'backlash': 0.02}")
+@pytest.mark.variants
 @pytest.mark.parametrize(
     "options", [{"rate": 2500}, {"rate": 500}, {"backlash": 0.02}, {"line": False}], ids=str
 )
@@ -143,6 +144,7 @@ def test_single_precision_differs_by_its_rounding() -> None:
         assert ours.sums[3] == pytest.approx(theirs.sums[3], rel=0.02)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("line", [True, False], ids=["knee", "voltage"])
 def test_accelerations_agree_with_pinocchio_in_random_states(line: bool) -> None:
     robot = made(line=line)
@@ -211,6 +213,7 @@ def of_voltage(wanted: float, rate: float, k: float, resistance: float, supply: 
     return float(np.clip(wanted, least, most))
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("timestep", [2e-4, 1e-4])
 def test_electrical_energy_is_heat_and_what_the_bodies_gain(timestep: float) -> None:
     """Free flight without friction: of the integrands, power less heat is the mechanical work."""
@@ -251,6 +254,7 @@ def rotors_alone(rate: int) -> Robot:
     return load_robot(files.model_copy(update={"toml": heavy, "urdf": urdf}))
 
 
+@pytest.mark.variants("native-1000", "reference-1000")
 @pytest.mark.parametrize("rate", [500, 1000, 2500])
 @pytest.mark.parametrize("backend", ["native", "reference"])
 def test_the_step_response_of_a_joint_is_that_of_a_held_pd_in_closed_form(

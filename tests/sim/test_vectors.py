@@ -177,6 +177,7 @@ SIGNS: Final = ((1, 1), (1, -1), (-1, 1))
 """Of product and addend in a b + c, a b - c and c - a b."""
 
 
+@pytest.mark.thorough("test_a_product_used_only_in_sums_is_fused")
 @pytest.mark.variants("single")
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_products_and_sums_are_rounded_once(precision: Precision) -> None:

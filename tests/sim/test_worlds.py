@@ -76,6 +76,7 @@ def bits(outcome: Outcome) -> tuple[bytes, bytes]:
     return outcome.objectives.tobytes(), outcome.statuses.tobytes()
 
 
+@pytest.mark.variants("slope-fast")
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_the_nominal_world_is_the_model_to_the_bit(scenario: Scenario) -> None:
     walked = case(*NAMES, scenario=scenario, design=PUBLISHED_A, controller=MAIN)
@@ -349,6 +350,7 @@ def test_held_out_scenarios_are_none_of_the_table_and_can_be_walked(scenario: Sc
     assert outcome.statuses.tolist() == [Status.OK]
 
 
+@pytest.mark.variants("backlash")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reconstructed", "backlash"])
 def test_designs_in_one_world_have_the_bits_of_worlds_of_one_design(name: str) -> None:

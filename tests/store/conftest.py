@@ -18,7 +18,7 @@ from tests.store.postgres_server import PostgresServer, postgres_server, server_
 
 _DATABASES = ["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)]
 
-_ON_POSTGRESQL = {"test_bits", "test_chain", "test_claims", "test_history", "test_job_list"}
+_ON_POSTGRESQL = {"test_bits", "test_claims", "test_job_list"}
 """Modules that `make test` runs on PostgreSQL too; `make test-all` runs all of them."""
 
 

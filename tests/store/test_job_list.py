@@ -61,6 +61,7 @@ def test_a_key_that_cannot_be_stored_is_refused(store: Store, key: str) -> None:
     assert store.jobs().items == ()
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-nul*")
 @pytest.mark.parametrize("job_id", ["", "nothing", "b" * 12, "nul\0", "\ud800", "x" * 10_000])
 def test_an_unknown_id_is_not_found_by_any_method(store: Store, job_id: str) -> None:
     for ask_for_it in (
@@ -210,7 +211,7 @@ def test_search_order_and_state_go_together(store: Store, clock: Clock) -> None:
     assert found == ["walk a", "walk c"]
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-created")
+@pytest.mark.variants("sqlite-created", "sqlite-gain", "sqlite-rate", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
 def test_jobs_made_between_two_pages_repeat_nothing(
     store: Store, clock: Clock, order: JobOrder
@@ -223,7 +224,7 @@ def test_jobs_made_between_two_pages_repeat_nothing(
     assert len(set(ids)) == len(ids) and made <= set(ids)
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-created")
+@pytest.mark.variants("sqlite-created", "sqlite-fitness", "sqlite-time_left", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
 def test_a_cursor_belongs_to_its_order(store: Store, clock: Clock, order: JobOrder) -> None:
     named(store, clock, "a", "b", "c")
@@ -252,6 +253,7 @@ def test_what_is_not_a_cursor_of_another_order_is_refused_by_name(
     assert refused.value.field == "after"
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-x")
 @pytest.mark.parametrize(
     "after",
     ["", "x", "1.", "12.bbb", "999999999999999999.bbbbbbbbbbbb", "1.BBBBBBBBBBBB", "-1.b", "\0"],

@@ -159,6 +159,7 @@ def test_both_ends_notice_within_a_lease_that_the_other_has_gone(database: Datab
             assert unanswered == engine.SILENCE_SECONDS * 1000
 
 
+@pytest.mark.thorough("test_both_ends_notice_within_a_lease_that_the_other_has_gone")
 @pytest.mark.skipif(
     os.geteuid() != 0 or UNSHARE is None or shutil.which("ip") is None,
     reason="a network of its own takes root, unshare and ip",

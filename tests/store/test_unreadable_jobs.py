@@ -85,7 +85,7 @@ def damaged(store: Store, write_spec: Write, unreadable: str) -> Job:
     return store.job(job.id)
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-with keys that nest", "sqlite-no object")
 def test_the_next_job_is_claimed_and_the_unreadable_one_has_failed_with_its_reason(
     store: Store, clock: Clock, damaged: Job
 ) -> None:
@@ -100,7 +100,7 @@ def test_the_next_job_is_claimed_and_the_unreadable_one_has_failed_with_its_reas
     assert "cannot be read" in failed.error and "resume" in failed.error
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-no object")
 def test_nothing_else_of_its_row_is_touched(
     store: Store, clock: Clock, damaged: Job, database_url: str, unreadable: str
 ) -> None:
@@ -113,7 +113,7 @@ def test_nothing_else_of_its_row_is_touched(
     assert after["spec"] == unreadable
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-null")
 def test_lists_show_it_among_the_others(store: Store, clock: Clock, damaged: Job) -> None:
     clock.advance(1.0)
     sound, _ = store.create_job(spec(name="sound"))
@@ -129,7 +129,7 @@ def test_lists_show_it_among_the_others(store: Store, clock: Clock, damaged: Job
     assert store.jobs(kind="certificate").items == ()
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-of an unknown kind", "sqlite-no object")
 def test_its_spec_is_refused_with_the_reason_to_its_users(store: Store, damaged: Job) -> None:
     assert not damaged.readable
     with pytest.raises(Conflict, match=rf"{damaged.id}: its spec cannot be read"):
@@ -138,7 +138,7 @@ def test_its_spec_is_refused_with_the_reason_to_its_users(store: Store, damaged:
         store.extend(damaged.id, 40)
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-with an unknown field")
 def test_it_can_be_resumed_by_a_version_that_can_read_it_and_by_no_other(
     store: Store, damaged: Job, write_spec: Write
 ) -> None:
@@ -156,12 +156,12 @@ def test_it_can_be_resumed_by_a_version_that_can_read_it_and_by_no_other(
     assert claim is not None and claim.job.spec == spec(name="mine").resolved()
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-null")
 def test_it_can_be_cancelled(store: Store, damaged: Job) -> None:
     assert store.command(damaged.id, Command.CANCEL).state is JobState.CANCELLED
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-newer", "sqlite-of a wrong type")
 def test_its_key_still_means_it(store: Store, damaged: Job) -> None:
     assert store.create_job(spec(), idempotency_key="damaged") == (damaged, False)
     with pytest.raises(IdempotencyConflict, match="cannot be read"):
@@ -314,7 +314,7 @@ def test_a_job_whose_provenance_cannot_be_read_is_set_aside_too(
     assert error is not None and "provenance" in error
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-newer")
+@pytest.mark.variants("sqlite-of a wrong type")
 def test_what_a_new_job_costs_is_not_asked_of_one_that_cannot_be_read(
     store: Store, damaged: Job
 ) -> None:

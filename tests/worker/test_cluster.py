@@ -69,6 +69,7 @@ def other_version(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": str(folder)}
 
 
+@pytest.mark.thorough("a cluster without processors")
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_without_cpus_requests_fail_with_the_reason(host: Process, runner: Process) -> None:
@@ -91,6 +92,9 @@ def test_a_worker_of_another_version_is_refused(
     runner.run(cluster_runner.wait_for_slots, 0)
 
 
+@pytest.mark.thorough(
+    "test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits, of a node"
+)
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_simulations_of_a_node_that_is_lost_run_on_others_to_the_same_bits(
@@ -108,6 +112,7 @@ def test_simulations_of_a_node_that_is_lost_run_on_others_to_the_same_bits(
     assert sorted(runner.run(cluster_runner.nodes_of_cluster)) == [0, 0, 1]
 
 
+@pytest.mark.thorough("a cluster that grows")
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_an_autoscaler_sees_that_more_cpus_would_be_used(host: Process, runner: Process) -> None:
@@ -115,7 +120,7 @@ def test_an_autoscaler_sees_that_more_cpus_would_be_used(host: Process, runner: 
     assert runner.run(cluster_runner.demand_seen, request(20_000, job_id="long")) > 0
 
 
-@pytest.mark.thorough("test_simulations_of_a_node_that_is_lost_run_on_others_to_the_same_bits")
+@pytest.mark.thorough("test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits")
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_a_job_on_three_nodes_of_which_one_is_lost_every_few_seconds_has_the_same_bits(
@@ -148,7 +153,7 @@ def test_a_job_on_three_nodes_of_which_one_is_lost_every_few_seconds_has_the_sam
     assert history(store, there) == history(store, here)
 
 
-@pytest.mark.thorough("test_without_cpus_requests_fail_with_the_reason")
+@pytest.mark.thorough("the head of a cluster")
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_head_that_is_killed_is_noticed_within_seconds(host: Process, runner: Process) -> None:

@@ -62,6 +62,7 @@ def test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits(
     assert bits(found) == expected
 
 
+@pytest.mark.thorough("test_walks_that_kill_worker_after_worker_fail_their_job_with_the_reason")
 @pytest.mark.slow
 def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continues(
     ray_evaluator: RayEvaluator,

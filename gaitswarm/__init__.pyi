@@ -1,10 +1,10 @@
 from gaitswarm.errors import Interrupted, JobEnded
 from gaitswarm.evidence.verify import verify
 from gaitswarm.firmware import FirmwareOptions, FirmwareView, write_firmware
-from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs, AsyncJobs
+from gaitswarm.jobs.asynchronous import AsyncJobs
 from gaitswarm.jobs.base import JobEvent, Jobs
 from gaitswarm.jobs.database import DatabaseJobs
-from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
+from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
 from gaitswarm.optimization import OptimizationResult, optimize, optimizers
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
@@ -75,7 +75,7 @@ from gaitswarm.views.verification import VerificationView
 
 __all__ = [
     "CONTROLLERS", "MEASUREMENTS", "OBJECTIVES", "PREFERENCES", "PRESETS", "SCENARIOS",
-    "AsyncDatabaseJobs", "AsyncJobs", "AutoSettings", "Backoff", "BayesianSettings", "BestView",
+    "AsyncJobs", "AutoSettings", "Backoff", "BayesianSettings", "BestView",
     "CalibrationSpec", "CertificateSpec", "CertificateView", "CmaEsSettings", "Conflict",
     "DatabaseJobs", "DeSettings", "EvaluationTable", "EvaluationView", "EvaluatorUnavailable",
     "FirmwareOptions", "FirmwareView", "Forbidden", "FrontView", "GaitswarmError",
@@ -90,7 +90,7 @@ __all__ = [
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
     "Variable", "VerificationView", "WalkLog", "__version__", "connect",
-    "connect_async", "job_spec", "open", "open_async", "optimize", "optimizers", "robustness",
+    "job_spec", "open", "optimize", "optimizers", "robustness",
     "simulate", "verify", "write_firmware",
 ]  # fmt: skip
 

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import aclosing, suppress
 from functools import partial, wraps
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar, cast
 
 import anyio
-from anyio import from_thread, to_thread
-from anyio.lowlevel import checkpoint
+from anyio import to_thread
 
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop
-from gaitswarm.views.job import IterationView, JobView
-
-if TYPE_CHECKING:
-    from gaitswarm.jobs.database import DatabaseJobs
-    from gaitswarm.services.optimizer.run.evaluator import Evaluator
-    from gaitswarm.services.runtime import EvaluatorKind
+from gaitswarm.views.job import JobView
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -32,8 +25,7 @@ def _awaited(
 
     @wraps(method)
     async def call(self: AsyncJobs, /, *arguments: P.args, **options: P.kwargs) -> T:
-        jobs = await self._jobs()
-        work = partial(getattr(jobs, method.__name__), *arguments, **options)
+        work = partial(getattr(self._jobs, method.__name__), *arguments, **options)
         return cast(T, await to_thread.run_sync(work, abandon_on_cancel=True))
 
     return call
@@ -56,26 +48,27 @@ def _iterated(
 
 
 class AsyncJobs:
-    """`Jobs` for programs with an event loop (`gaitswarm.open_async`, `gaitswarm.connect_async`).
+    """`Jobs` for programs with an event loop: `AsyncJobs(gaitswarm.connect(url))`.
 
     Methods have the names, arguments, results and errors of `Jobs`, where they are documented; they
     are awaited, or iterated with `async for`. A cancelled call returns at once: its thread finishes
     alone and its result is dropped, so that a change may still take effect. A cancelled `follow`
     closes its connection; a loop that is left early should close it as well, with
-    `contextlib.aclosing`.
+    `contextlib.aclosing`. An asynchronous context manager: leaving the block closes the jobs.
     """
 
-    def __init__(self, connect: Callable[[], Jobs], url: str) -> None:
-        """connect: opens the jobs; called once, in a thread, on entering or at first use."""
-        self._connect = connect
-        self._url = url
-        self._opened: Jobs | None = None
-        self._opening = anyio.Lock()
+    def __init__(self, jobs: Jobs) -> None:
+        """Call the methods of jobs in threads.
+
+        Args:
+            jobs: On a server or in a database; closed with this.
+        """
+        self._jobs = jobs
 
     @property
     def url(self) -> str:
         """URL of the server, or file or URL of the database."""
-        return self._url
+        return self._jobs.url
 
     submit = _awaited(Jobs.submit)
     fork = _awaited(Jobs.fork)
@@ -116,8 +109,8 @@ class AsyncJobs:
     async def follow(
         self, job_id: str, *, after: int | None = None
     ) -> AsyncGenerator[JobEvent, None]:
-        jobs, stop = await self._jobs(), Stop()
-        events = jobs._follow(job_id, after, stop)  # noqa: SLF001
+        stop = Stop()
+        events = self._jobs._follow(job_id, after, stop)  # noqa: SLF001
         try:
             # A thread of its own: streams that wait must not occupy those of other calls.
             async for event in _items(events, anyio.CapacityLimiter(1)):
@@ -133,11 +126,9 @@ class AsyncJobs:
         return await self.job(job_id)
 
     async def close(self) -> None:
-        if self._opened is not None:
-            await to_thread.run_sync(self._opened.close)
+        await to_thread.run_sync(self._jobs.close)
 
     async def __aenter__(self) -> Self:
-        await self._jobs()
         return self
 
     async def __aexit__(
@@ -147,68 +138,6 @@ class AsyncJobs:
         traceback: TracebackType | None,
     ) -> None:
         await self.close()
-
-    async def _jobs(self) -> Jobs:
-        async with self._opening:
-            if self._opened is None:
-                self._opened = await to_thread.run_sync(self._connect)
-            return self._opened
-
-
-class AsyncDatabaseJobs(AsyncJobs):
-    """Jobs in a database, which this process can also run."""
-
-    async def run(
-        self,
-        job_id: str,
-        *,
-        evaluator: EvaluatorKind | Evaluator = "auto",
-        cpus: int | None = None,
-        ray_address: str | None = None,
-        accept_changes: bool = False,
-        on_iteration: Callable[[IterationView], None] | None = None,
-    ) -> JobView:
-        """Run a job in a thread; where this is cancelled, the job is returned to the queue first.
-
-        Arguments, result and errors are those of `DatabaseJobs.run`; `on_iteration` is called in
-        the event loop.
-        """
-        jobs, stop = cast("DatabaseJobs", await self._jobs()), threading.Event()
-
-        def committed(iteration: IterationView) -> None:
-            if on_iteration is not None and not stop.is_set():
-                from_thread.run_sync(on_iteration, iteration)
-
-        async def stop_with_the_task() -> None:
-            try:
-                await anyio.sleep_forever()
-            finally:
-                stop.set()
-
-        work = partial(
-            jobs.run,
-            job_id,
-            evaluator=evaluator,
-            cpus=cpus,
-            ray_address=ray_address,
-            accept_changes=accept_changes,
-            on_iteration=committed,
-            stop=stop,
-        )
-        error = ended = None
-        async with anyio.create_task_group() as group:
-            group.start_soon(stop_with_the_task)
-            try:
-                # Not abandoned: the thread returns the job to the queue.
-                ended = await to_thread.run_sync(work, limiter=anyio.CapacityLimiter(1))
-            except Exception as raised:  # noqa: BLE001 - raised again, outside the group
-                error = raised
-            group.cancel_scope.cancel()
-        # Raises the cancellation, if the task was cancelled.
-        await checkpoint()
-        if error is not None:
-            raise error
-        return cast(JobView, ended)
 
 
 async def _items(

@@ -13,7 +13,6 @@ from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs, AsyncJobs
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.server import ServerJobs
@@ -49,26 +48,6 @@ def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
     return DatabaseJobs(JobService(open_store(url)), url)
 
 
-def open_async(
-    db: str | os.PathLike[str] | None = None, *, create: bool = True
-) -> AsyncDatabaseJobs:
-    """Open a database of jobs, for a program with an event loop.
-
-    Args:
-        db: As for `open`.
-        create: Whether to create an SQLite file that does not exist.
-
-    Returns:
-        The jobs in it, as an asynchronous context manager, which opens the database on entering and
-        raises the errors of `open`.
-    """
-    from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs
-    from gaitswarm.settings import read_settings
-
-    url = read_settings(db=None if db is None else os.fspath(db)).database
-    return AsyncDatabaseJobs(lambda: open(db, create=create), url)
-
-
 def connect(
     url: str,
     *,
@@ -99,35 +78,6 @@ def connect(
 
     sent = with_token(url, headers, token, read_settings())
     return ServerJobs(url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent)
-
-
-def connect_async(
-    url: str,
-    *,
-    timeout: float | None = None,
-    backoff: Backoff | None = None,
-    headers: Mapping[str, str] | None = None,
-    token: str | None = None,
-) -> AsyncJobs:
-    """Connect to a server, for a program with an event loop.
-
-    Args:
-        url: Of the server, such as http://127.0.0.1:8000. Nothing is sent yet.
-        timeout: Longest silence of the server [s]; default 30.
-        backoff: As for `connect`.
-        headers: Sent with every request.
-        token: As for `connect`.
-
-    Returns:
-        The server's jobs, as an asynchronous context manager.
-
-    Raises:
-        InvalidRequest: It is not a URL, or the token would leave this machine as plain text.
-    """
-    from gaitswarm.jobs.asynchronous import AsyncJobs
-
-    jobs = connect(url, timeout=timeout, backoff=backoff, headers=headers, token=token)
-    return AsyncJobs(lambda: jobs, jobs.url)
 
 
 def with_token(

@@ -140,10 +140,11 @@ def reach(
                 case "server":
                     return stack.enter_context(gaitswarm.connect(serve(db)))
                 case "async database":
-                    reached: gaitswarm.AsyncJobs = gaitswarm.open_async(db)
+                    reached: gaitswarm.Jobs = gaitswarm.open(db)
                 case _:
-                    reached = gaitswarm.connect_async(serve(db))
-            stack.enter_context(portal.wrap_async_context_manager(reached))
-            return cast(gaitswarm.Jobs, Blocking(reached, portal))
+                    reached = gaitswarm.connect(serve(db))
+            there = gaitswarm.AsyncJobs(reached)
+            stack.enter_context(portal.wrap_async_context_manager(there))
+            return cast(gaitswarm.Jobs, Blocking(there, portal))
 
         yield jobs

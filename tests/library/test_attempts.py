@@ -200,7 +200,7 @@ def test_a_program_with_an_event_loop_makes_the_same_attempts(
     async def work() -> None:
         way = Flaky(losses=2)
         there = gaitswarm.ServerJobs(url, backoff=QUICK, transport=way)
-        async with gaitswarm.AsyncJobs(lambda: there, url) as jobs:
+        async with gaitswarm.AsyncJobs(there) as jobs:
             job = await jobs.submit(**SMALL)
             assert len({request.headers["Idempotency-Key"] for request in way.sent}) == 1
             assert [found.id async for found in jobs.jobs()] == [job.id]
@@ -249,9 +249,8 @@ def test_a_server_that_is_missing_is_unavailable_and_named() -> None:
 
 
 def test_what_is_no_url_is_refused_at_once() -> None:
-    for connect in (gaitswarm.connect, gaitswarm.connect_async):
-        with pytest.raises(gaitswarm.InvalidRequest, match="not a URL"):
-            connect("jobs.db")
+    with pytest.raises(gaitswarm.InvalidRequest, match="not a URL"):
+        gaitswarm.connect("jobs.db")
 
 
 def test_a_server_without_certificates_is_trusted_for_none() -> None:
@@ -352,7 +351,7 @@ def follow(request: pytest.FixtureRequest) -> Follow:
             async def following() -> list[gaitswarm.JobEvent]:
                 there = gaitswarm.ServerJobs(URL, transport=way, **options)
                 async with (
-                    gaitswarm.AsyncJobs(lambda: there, URL) as jobs,
+                    gaitswarm.AsyncJobs(there) as jobs,
                     aclosing(cast(Any, jobs.follow("k2q7zr5dm9xw", after=after))) as events,
                 ):
                     return [event async for event in events]

@@ -53,7 +53,7 @@ async def follow(jobs: gaitswarm.AsyncJobs, job_id: str, *, cancel: bool) -> Non
 @pytest.mark.parametrize("cancel", [True, False], ids=["cancelled", "left"])
 def test_a_stream_that_is_followed_no_longer_is_closed_at_once(db: Path, cancel: bool) -> None:
     async def work(url: str) -> None:
-        async with gaitswarm.connect_async(url) as there:
+        async with gaitswarm.AsyncJobs(gaitswarm.connect(url)) as there:
             job = await there.submit(**SMALL)
             begun = time.monotonic()
             await follow(there, job.id, cancel=cancel)
@@ -76,7 +76,7 @@ def test_a_database_that_is_followed_no_longer_is_read_no_longer(db: Path, cance
     async def work() -> None:
         service = Counted(open_store(str(db)))
         here = gaitswarm.DatabaseJobs(service, str(db), poll_seconds=0.1)
-        async with gaitswarm.AsyncJobs(lambda: here, here.url) as jobs:
+        async with gaitswarm.AsyncJobs(here) as jobs:
             job = await jobs.submit(**SMALL)
             await follow(jobs, job.id, cancel=cancel)
             await anyio.sleep(0.05)
@@ -98,7 +98,7 @@ def test_a_cancelled_question_returns_at_once() -> None:
         with closing(
             gaitswarm.ServerJobs("http://robots", backoff=patient, transport=way)
         ) as there:
-            jobs = gaitswarm.AsyncJobs(lambda: there, there.url)
+            jobs = gaitswarm.AsyncJobs(there)
             with anyio.move_on_after(0.1) as scope:
                 await jobs.job("k2q7zr5dm9xw")
             assert scope.cancelled_caught

@@ -71,5 +71,3 @@ def test_a_command_refuses_before_anything_is_sent(monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("GAITSWARM_TOKEN", "secret")
     with pytest.raises(gaitswarm.InvalidRequest, match="plain text"):
         gaitswarm.connect("http://robots.example")
-    with pytest.raises(gaitswarm.InvalidRequest, match="plain text"):
-        gaitswarm.connect_async("http://robots.example")

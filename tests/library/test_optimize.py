@@ -9,10 +9,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import anyio
 import numpy as np
 import pytest
-from anyio import to_thread
 
 import gaitswarm
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -345,67 +343,7 @@ def test_a_run_that_is_stopped_returns_the_job_as_it_gave_it_back(db: Path) -> N
     assert (stopped.state, stopped.iterations) == ("queued", 1)
 
 
-def test_an_event_loop_continues_while_it_runs_a_job(db: Path, finished: Finished) -> None:
-    received: list[gaitswarm.JobEvent] = []
-
-    async def work() -> gaitswarm.JobView:
-        # Neither a job that runs nor one that is followed occupies the thread of other calls.
-        to_thread.current_default_thread_limiter().total_tokens = 1
-        async with gaitswarm.open_async(db) as jobs:
-            job = await jobs.submit(**SMALL)
-
-            async def follow() -> None:
-                received.extend([event async for event in jobs.follow(job.id)])
-
-            async with anyio.create_task_group() as group:
-                group.start_soon(follow)
-                await jobs.run(job.id)
-            return await jobs.job(job.id)
-
-    job = anyio.run(work)
-    assert job.best is not None
-    assert job.best.design == finished.result.best.design
-    assert [e.index for e in received if isinstance(e, gaitswarm.IterationView)] == [0, 1]
-
-
-def test_a_task_that_is_cancelled_gives_its_job_back(db: Path) -> None:
-    # Long enough not to end before the cancellation is heard.
-    long = {**SMALL, "iterations": 8}
-
-    async def work() -> gaitswarm.JobView:
-        async with gaitswarm.open_async(db) as jobs:
-            job = await jobs.submit(**long)
-            with anyio.CancelScope() as scope:
-                await jobs.run(job.id, on_iteration=lambda _: scope.cancel())
-            assert scope.cancelled_caught
-            return await jobs.job(job.id)
-
-    job = anyio.run(work)
-    assert job.state == "queued"
-    assert 1 <= job.iterations < long["iterations"]
-    gaitswarm.optimize(resume=job.id, db=db)
-    never_stopped = gaitswarm.optimize(db=db, **long)
-    assert same_history(db, job.id, Finished(db, never_stopped))
-
-
-def test_an_exception_of_a_tasks_callback_is_passed_on(db: Path) -> None:
-    async def work() -> None:
-        async with gaitswarm.open_async(db) as jobs:
-            job = await jobs.submit(**SMALL)
-            with pytest.raises(ArithmeticError):
-                await jobs.run(job.id, on_iteration=stop_after_one(ArithmeticError))
-            assert (await jobs.job(job.id)).state == "queued"
-
-    anyio.run(work)
-
-
 def test_a_missing_database_is_noticed_on_entering(tmp_path: Path) -> None:
-    async def enter() -> None:
-        async with gaitswarm.open_async(tmp_path / "none.db", create=False):
-            raise AssertionError("there is none")
-
-    with pytest.raises(gaitswarm.NotFound):
-        anyio.run(enter)
     with pytest.raises(gaitswarm.NotFound):
         gaitswarm.open(tmp_path / "none.db", create=False)
     assert list(tmp_path.glob("*.db")) == []

@@ -61,5 +61,3 @@ async def ask_in_a_task(jobs: gaitswarm.AsyncJobs) -> None:
     await jobs.front(job.id, most="1")  # type: ignore[arg-type]
     async for iteration in jobs.iterations(job.id):
         assert_type(iteration, gaitswarm.IterationView)
-    async with gaitswarm.open_async("jobs.db") as here:
-        assert_type(await here.run(job.id), gaitswarm.JobView)

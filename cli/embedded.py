@@ -12,13 +12,10 @@ from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.progress import Progress, show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, worth
-from gaitswarm.designs import SimulationRequest
 from gaitswarm.jobs.database import DatabaseJobs, check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import JobState
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.reference import adapted_to_job, published_study
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import (
@@ -29,8 +26,6 @@ from gaitswarm.services.runtime import (
     stop_on_signals,
 )
 from gaitswarm.settings import read_settings
-from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.simulation import run_simulation
 
 if TYPE_CHECKING:
     from gaitswarm.cli.options import WorkerOptions
@@ -39,7 +34,6 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
     from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
-    from gaitswarm.simulation import SimulationView
     from gaitswarm.views.job import JobView
 
 
@@ -201,7 +195,6 @@ def finish(
     interrupted: bool,
     *,
     as_json: bool,
-    compare: bool,
     others: Mapping[str, JobView],
 ) -> None:
     """Print the result, next to those of other jobs of the same problem by label.
@@ -212,7 +205,7 @@ def finish(
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)
         raise KeyboardInterrupt
-    show(job, _report(job, jobs.place, compare=compare, others=others), as_json=as_json)
+    show(job, _report(job, jobs.place, others), as_json=as_json)
     if job.state is not JobState.SUCCEEDED:
         raise ended(job, jobs.place)
 
@@ -243,17 +236,18 @@ def _resume_hint(job_id: str, place: str) -> str:
     return f"to resume, run\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(job: JobView, place: str, *, compare: bool, others: Mapping[str, JobView]) -> Parts:
+def _report(job: JobView, place: str, others: Mapping[str, JobView]) -> Parts:
     if job.best is None:
         yield "no design walks in every scenario"
     else:
         best = {name: other.best for name, other in others.items() if other.best is not None}
-        published = published_results(job.spec) if compare else {}
-        evaluations = {"best": job.best} | best | published
+        evaluations = {"best": job.best} | best
         yield design_table(job.spec, {k: e.design for k, e in evaluations.items()})
         yield results_table({k: e.scenarios for k, e in evaluations.items()}, job.objectives)
         for name, evaluation in evaluations.items():
             yield f"fitness of {name}: {worth(evaluation)}"
+        if job.gain is not None and job.reference is not None:
+            yield f"gain over {job.reference.kind} {job.reference.name}: {job.gain:.1%}"
         yield from search_line(job.best)
     rate = job.simulations_per_second
     speed = f" at {rate:.0f} simulations/s" if rate else ""
@@ -265,27 +259,3 @@ def _report(job: JobView, place: str, *, compare: bool, others: Mapping[str, Job
         note(f"simulated on {job.evaluated_on}{hint}")
     note(f"history: gaitswarm history {job.id}{place}")
     note(f"page: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")
-
-
-def published_results(spec: Spec) -> dict[str, SimulationView]:
-    """Return the published optimum for the job's controller and preference, by label.
-
-    If none was published for that preference, the controller's first; none for jobs that tune no
-    drive.
-    """
-    study = published_study(spec) if isinstance(spec, JobSpec) else None
-    if study is None or not isinstance(spec, JobSpec):
-        return {}
-    return {f"published {study}": published_walk(spec, study)}
-
-
-def published_walk(spec: JobSpec, study: str) -> SimulationView:
-    published = CONTROLLERS[spec.controller].published[study]
-    request = SimulationRequest(
-        robot=spec.robot,
-        controller=spec.controller,
-        design=adapted_to_job(published, spec),
-        scenarios=spec.scenarios,
-        preference=spec.preference,
-    )
-    return run_simulation(request)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,8 +13,8 @@ import typer
 
 from gaitswarm.cli.commands.designs import Radius, Samples, Seed, shown_progress
 from gaitswarm.cli.files import replacing
-from gaitswarm.cli.options import JobId, Json, Place, Precision
-from gaitswarm.cli.output import Parts, Printed, note, show
+from gaitswarm.cli.options import JobId, Precision
+from gaitswarm.cli.output import Parts, Printed, note
 from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
         LossView,
         ScenarioFamiliesView,
     )
-    from gaitswarm.simulation import SimulationView
 
 
 def rank(
@@ -95,14 +93,9 @@ def front(
     most: Annotated[
         int, typer.Option(help="Maximum number of designs with --json and --output.")
     ] = 1000,
-    published: Annotated[
-        bool,
-        typer.Option(help="Also simulate the controller's published designs and place them."),
-    ] = False,
     *,
-    place: Place,
-    as_json: Json = False,
-) -> None:
+    jobs: Jobs,
+) -> Printed:
     """Show the Pareto front of a job's stored designs, without simulation.
 
     Lists knees, the best design in each objective, under A, B and C, and under the job's
@@ -110,20 +103,16 @@ def front(
     """
     if output is not None and output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
-    if published and as_json:
-        raise InvalidRequest("cannot be combined with --json", field="published")
-    with place.open() as jobs:
-        view = jobs.front(job_id, most=most)
-        placed = _place_published(jobs, job_id) if published else {}
+    view = jobs.front(job_id, most=most)
     if output is not None:
         with replacing(output, "output") as file:
             file.write(_front_csv(view))
         note(f"{len(view.designs)} designs written to {output}")
-    show(view, _front(view, placed), as_json=as_json)
+    return view, _front(view)
 
 
-def _front(view: FrontView, published: Mapping[str, Placed]) -> Parts:
-    """Yield knees, the best in each objective, winners of preferences, and published designs."""
+def _front(view: FrontView) -> Parts:
+    """Yield knees, the best in each objective, and winners of preferences."""
     heads = [f"{SHORT[o.name]}\n{o.unit}" for o in view.objectives]
     rows = (
         (label, place(design), *map(number, design.objectives.values()), number(design.fitness))
@@ -142,16 +131,6 @@ def _front(view: FrontView, published: Mapping[str, Placed]) -> Parts:
                 f"the best under {_whose(winner)} is dominated by {winner.dominated_by} designs,"
                 f" and behind one in every objective by {100.0 * winner.behind:.2g} %"
             )
-    for name, design in published.items():
-        if design.objectives is None:
-            yield f"published {name} fails in a scenario"
-            continue
-        values = [f"{SHORT[key]} {number(value)}" for key, value in design.objectives.items()]
-        yield (
-            f"published {name} is dominated by {design.dominated_by} of {design.of} designs of the"
-            f" front, and dominates {design.dominates}: {', '.join(values)}, fitness"
-            f" {number(design.fitness)}"
-        )
 
 
 def _marked(view: FrontView) -> Mapping[str, NormalisedDesignView]:
@@ -169,61 +148,6 @@ def _marked(view: FrontView) -> Mapping[str, NormalisedDesignView]:
 
 def _whose(winner: FrontWinnerView) -> str:
     return "the job's own" if winner.preference == "job" else winner.preference
-
-
-@dataclass(frozen=True, slots=True)
-class Placed:
-    """Position of another design relative to a front.
-
-    Attributes:
-        objectives: over all scenarios, by name; None if it fails in one.
-        fitness: by the job's preference.
-        dominated_by: number of designs of the front that dominate it.
-        dominates: number of designs of the front that it dominates.
-        of: number of designs of the front.
-    """
-
-    objectives: dict[str, float] | None
-    fitness: float | None
-    dominated_by: int
-    dominates: int
-    of: int
-
-
-def _place_published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
-    from gaitswarm.cli.embedded import published_walk
-    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-    from gaitswarm.sim.controllers import CONTROLLERS
-
-    spec, view = jobs.job(job_id).spec, jobs.front(job_id, most=10_000)
-    if not isinstance(spec, JobSpec) or spec.worlds is not None:
-        raise InvalidRequest(
-            "a job with worlds cannot be compared with published designs", field="published"
-        )
-    names = CONTROLLERS[spec.controller].published
-    return {name: _placed(published_walk(spec, name), view) for name in names}
-
-
-def _placed(walk: SimulationView, view: FrontView) -> Placed:
-    """Place a design, simulated in the job's scenarios, relative to the front."""
-    import numpy as np
-
-    names = [objective.name for objective in view.objectives]
-    walks = [
-        [result.objectives[name] for name in names] for result in walk.scenarios.values()
-        if result.status == "ok"
-    ]  # fmt: skip
-    if len(walks) < len(walk.scenarios):
-        return Placed(None, None, 0, 0, len(view.designs))
-    means = np.exp(np.log(np.array(walks, dtype=np.float64)).mean(axis=0))
-    front = np.array([list(design.objectives.values()) for design in view.designs])
-    return Placed(
-        dict(zip(names, means.tolist(), strict=True)),
-        walk.fitness,
-        int(((front <= means).all(axis=1) & (front < means).any(axis=1)).sum()),
-        int(((means <= front).all(axis=1) & (means < front).any(axis=1)).sum()),
-        len(front),
-    )
 
 
 def _front_csv(view: FrontView) -> bytes:

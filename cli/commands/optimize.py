@@ -30,10 +30,6 @@ def optimize(
         ),
     ] = None,
     accept_changes: AcceptChanges = False,
-    compare_published: Annotated[
-        bool,
-        typer.Option("--compare-published", help="Compare the best design with the published one."),
-    ] = False,
     compare_optimizer: Annotated[
         str | None,
         typer.Option(
@@ -48,12 +44,8 @@ def optimize(
     from gaitswarm.cli.embedded import Embedded, finish
     from gaitswarm.cli.inputs import build_spec, by_other_optimizer, check_optimizer_name
 
-    for option, value in {
-        "compare-published": compare_published,
-        "compare-optimizer": compare_optimizer,
-    }.items():
-        if as_json and value:
-            raise InvalidRequest("cannot be combined with --json", field=option)
+    if as_json and compare_optimizer is not None:
+        raise InvalidRequest("cannot be combined with --json", field="compare-optimizer")
     if accept_changes and resume is None:
         raise InvalidRequest("requires --resume", field="accept-changes")
     spec = build_spec(options) if resume is None or options.given else None
@@ -72,4 +64,4 @@ def optimize(
         if compare_optimizer is not None and not interrupted:
             other = embedded.run_to_end(by_other_optimizer(job.spec, compare_optimizer))
             others[compare_optimizer] = jobs.job(other.id)
-        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, others=others)
+        finish(jobs, job.id, interrupted, as_json=as_json, others=others)

@@ -41,27 +41,9 @@ def test_a_front_is_shown_with_its_marks_and_written_as_a_table(
     assert f"hypervolume {view['hypervolume']:.4f}" in shown.out
 
 
-def test_published_designs_are_placed_relative_to_the_front(
-    gaitswarm: Gaitswarm, finished: Finished, write_json: WriteJson
-) -> None:
-    where = (finished.id, "--db", finished.db)
-    result = gaitswarm("front", *where, "--published")
-    assert result.code == 0, result.err
-    view = gaitswarm("front", *where, "--json").json
-    spec = gaitswarm("status", *where, "--json").json["spec"]
-    scenario = write_json(spec["scenarios"][0], "walk.json")
-    walk = gaitswarm("simulate", "--design", "published:A", "--scenario", scenario, "--json")
-    (line,) = [line for line in result.out.splitlines() if line.startswith("published A ")]
-    (own,) = [result["objectives"] for result in walk.json["scenarios"].values()]
-    fronts = [design["objectives"] for design in view["designs"]]
-    better = sum(all(front[name] <= own[name] for name in front) for front in fronts)
-    assert f"is dominated by {better} of {view['size']} designs of the front" in line
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--published", "--json"), "published: cannot be combined with --json"),
         (("--most", "0"), "most: must be at least 1"),
         (("--output", "front.xlsx"), "output: front.xlsx must end in .csv"),
     ],
@@ -143,9 +125,6 @@ def test_a_job_in_worlds_has_a_front(gaitswarm: Gaitswarm, db: Path, write_json:
     )
     assert view["fits"][0]["rank"] == place
     assert view["certain"] == view["wins"]
-    refused = gaitswarm("front", job["id"], "--db", db, "--published")
-    assert refused.code == 2
-    assert "published: a job with worlds cannot be compared" in refused.err
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,8 @@ _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
     "Robots and measurements": (
         *(robot.gaits, robot.mjcf, measurements.record, measurements.recordings),
         *(measurements.identify, measurements.parameters, measurements.calibrate),
-        *(measurements.targets, measurements.validate, measurements.synthesize),
+        measurements.targets,
+        measurements.validate,
     ),
     "Installation": (
         *(administration.optimizers, administration.cases, administration.plugins, "token"),

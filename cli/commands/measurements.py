@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 
 import typer
 
-from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import (
     ControllerOption,
     JobIds,
@@ -126,7 +125,7 @@ Truth = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.json",
-        help="True values by name, as for `synthesize --parameters`, shown for comparison.",
+        help="True values by name, shown for comparison.",
     ),
 ]
 
@@ -370,48 +369,6 @@ def validate(
         yield alignment(comparison)
 
     return comparison, parts()
-
-
-def synthesize(
-    options: WalkOptions,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE.csv", help="Where to write the log.")
-    ],
-    seed: Annotated[
-        int, typer.Option(min=0, max=(1 << 64) - 1, help="Seed of the sensor noise.")
-    ] = 1,
-    parameters: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.json",
-            help="Parameter values by name; the twin differs only in these.",
-        ),
-    ] = None,
-    *,
-    place: Place,
-) -> None:
-    """Write a SYNTHETIC log of a perturbed twin of the robot with sensor noise, for tests."""
-    from gaitswarm.sim.measurement.measured_csv import format_measured_log
-    from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
-    from gaitswarm.sim.robot.identifiable import identifiable_variables
-
-    if output.suffix != ".csv":
-        raise InvalidRequest(f"{output} must end in .csv", field="output")
-    walk = options.read(place)
-    twin = None
-    if parameters is not None:
-        names = {variable.name for variable in identifiable_variables(walk.robot)}
-        values = read_truth(parameters)
-        for name in values:
-            if name not in names:
-                raise InvalidRequest("no such parameter of the robot", field=f"parameters.{name}")
-        twin = Perturbation.of(values)
-    log = synthetic_log(
-        walk.robot, walk.scenario, walk.controller, walk.design, seed=seed, perturbation=twin
-    )
-    with replacing(output, "output") as file:
-        file.write(format_measured_log(log).encode())
-    note(f"SYNTHETIC log of {len(log.time)} rows written to {output}")
 
 
 LeaveOneOut = Annotated[

@@ -12,6 +12,7 @@ import pytest
 from gaitswarm.sim.firmware.folder import MANIFEST
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
+from tests.examples.commands import synthesize
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 from tests.firmware.conftest import make
 
@@ -92,8 +93,8 @@ def test_the_way_back_is_one_command(
     heavier = str(write_json({"body_mass": 3.5}, "heavier.json"))
     measured = tmp_path / "fw" / "build" / "measured.csv"
     measured.parent.mkdir()
-    recorded = gaitswarm(
-        *("synthesize", "--design", design, "--scenario", walk, "-o", measured),
+    recorded = synthesize(
+        *("--design", design, "--scenario", walk, "-o", measured),
         *(*own, "--parameters", heavier),
     )
     assert recorded.code == 0, recorded.err

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.commands import synthesize
 
 pytestmark = pytest.mark.slow
 
@@ -21,9 +22,9 @@ def scenario(write_json: WriteJson) -> Path:
 
 
 @pytest.fixture
-def log(gaitswarm: Gaitswarm, scenario: Path, truth: Path, tmp_path: Path) -> Path:
+def log(scenario: Path, truth: Path, tmp_path: Path) -> Path:
     path = tmp_path / "twin.csv"
-    made = gaitswarm("synthesize", *WALK, scenario, "--parameters", truth, "-o", path)
+    made = synthesize(*WALK, scenario, "--parameters", truth, "-o", path)
     assert made.code == 0, made.err
     return path
 
@@ -86,11 +87,9 @@ def test_unknown_parameters_are_refused_by_name(
     assert message in refused.err
 
 
-def test_a_twin_has_only_parameters_that_robots_have(
-    gaitswarm: Gaitswarm, write_json: WriteJson, tmp_path: Path
-) -> None:
+def test_a_twin_has_only_parameters_that_robots_have(write_json: WriteJson, tmp_path: Path) -> None:
     wrong = write_json({"body_weight": 4.5})
     path = tmp_path / "twin.csv"
-    refused = gaitswarm("synthesize", *WALK, "1", "--parameters", wrong, "-o", path)
+    refused = synthesize(*WALK, "1", "--parameters", wrong, "-o", path)
     assert refused.code == 2 and "parameters.body_weight" in refused.err
     assert not path.exists()

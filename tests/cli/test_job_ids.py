@@ -12,7 +12,7 @@ from gaitswarm.cli.options import full_id
 from gaitswarm.jobs.open import open_jobs
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from tests.cli.conftest import Finished, Gaitswarm
-from tests.examples.commands import run_command
+from tests.examples.commands import synthesize
 from tests.setup import command_line
 
 pytestmark = pytest.mark.slow
@@ -70,7 +70,6 @@ COMMANDS = {
     "simulate": "--design job:ID --json",
     "status": "ID --json",
     "submit": "--start-from ID,ID --json",
-    "synthesize": "--design job:ID --scenario 1 --cycles 2 --output FILE.csv",
     "targets": "ID",
     "validate": "MEASURED --design job:ID --scenario 1 --cycles 2 --json",
     "verify": "ID --replay 0",
@@ -95,7 +94,7 @@ def measured(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Pa
     """A log of the walk of the job's best."""
     path = tmp_path_factory.mktemp("measured") / "walk.csv"
     walk = ("--design", f"job:{finished.id}", "--scenario", "1", "--cycles", "2")
-    made = run_command("synthesize", *walk, "--output", path, "--db", finished.db)
+    made = synthesize(*walk, "--output", path, "--db", finished.db)
     assert made.code == 0, made.err
     return path
 

@@ -10,7 +10,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.sim.controllers import CONTROLLERS
-from tests.examples.commands import Result, run_command
+from tests.examples.commands import Result, run_command, synthesize
 from tests.examples.paths import ROOT
 from tests.examples.robots import SLOW, robot_folder
 
@@ -49,7 +49,9 @@ def test_walks_that_are_compared_with_logs_take_the_folders_controller(
     dog: Path, tmp_path: Path
 ) -> None:
     log = tmp_path / "log.csv"
-    made = command("synthesize", dog, "--scenario", "slow", "--cycles", 2, "-o", log)
+    made = synthesize(
+        "--robot", dog, "--design", PID, "--scenario", "slow", "--cycles", 2, "-o", log
+    )
     assert made.code == 0, made.err
     assert "# controller: pid" in log.read_text(encoding="utf-8")
     options = ("--robot", dog, "--design", PID, "--scenario", "slow", "--cycles", 2)
@@ -62,7 +64,9 @@ def test_walks_that_are_compared_with_logs_take_the_folders_controller(
     assert kept.code == 0, kept.err
     assert kept.json["controller"] == "pid"
     # An option goes before the folder.
-    refused = command("synthesize", dog, "--scenario", "slow", "--controller", "pi", "-o", log)
+    refused = synthesize(
+        "--robot", dog, "--design", PID, "--scenario", "slow", "--controller", "pi", "-o", log
+    )
     assert (refused.code, "design.D: unknown variable" in refused.err) == (2, True)
 
 

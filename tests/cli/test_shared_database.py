@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.commands import synthesize
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually, line_with
@@ -119,7 +120,7 @@ def test_identify_follows_runs_that_a_server_claims(
     walk = write_json(SHORT_WALK | {"cycle_time": 0.8, "cycles": 2}, "walk.json")
     log = tmp_path / "twin.csv"
     of_walk = ("--design", "published:A", "--scenario", walk)
-    assert gaitswarm("synthesize", *of_walk, "-o", log).code == 0
+    assert synthesize(*of_walk, "-o", log).code == 0
     recording = gaitswarm("record", log, *of_walk, "--db", db).out.strip()
     fitted = gaitswarm(
         "identify", recording, "--variables", "body_mass", "--runs", "3", "--db", db, *IN_PROCESS,

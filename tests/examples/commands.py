@@ -31,3 +31,13 @@ def run_command(*arguments: object) -> Result:
     with redirect_stdout(out), redirect_stderr(err):
         code = run([str(argument) for argument in arguments])
     return Result(code, out.getvalue(), err.getvalue())
+
+
+def synthesize(*arguments: object) -> Result:
+    """`python -m scripts.synthesize` in this process."""
+    from scripts.synthesize import main
+
+    out, err = StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main([str(argument) for argument in arguments])
+    return Result(code, out.getvalue(), err.getvalue())

@@ -8,8 +8,8 @@ import pytest
 
 from gaitswarm.sim.identification import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_log import simulated_log, synchronise
-from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
 from gaitswarm.sim.robot import Robot, load_robot
+from scripts.synthesize import Perturbation, synthetic_log
 from tests.examples.walks import PUBLISHED_A, logged_walk, short_walk
 
 SCENARIO = short_walk(name="brief", cycles=2, stride=0.16, height=0.03, curve="half_ellipse")

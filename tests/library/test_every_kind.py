@@ -16,8 +16,8 @@ from gaitswarm import JobView
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.sim.identification import record
 from gaitswarm.sim.measurement.measured_log import simulated_log, synchronise
-from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
 from gaitswarm.sim.robot import load_robot
+from scripts.synthesize import Perturbation, synthetic_log
 from tests.calibration.conftest import WALKS
 from tests.certificate.examples import DOCUMENT as CERTIFICATE
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, UPHILL_WALK, logged_walk, short_walk

@@ -9,9 +9,9 @@ import pytest
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, simulated_log
-from gaitswarm.sim.measurement.synthetic import synthetic_log
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.scenario import Scenario, find_scenario
+from scripts.synthesize import synthetic_log
 from tests.examples.walks import PUBLISHED_A, logged_walk
 
 

@@ -1,4 +1,4 @@
-"""`gaitswarm synthesize` and `gaitswarm validate`."""
+"""`gaitswarm validate`, and synthetic logs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gaitswarm.cli.main import run
 from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.sim.validation import Tolerance, compare
-from tests.examples.commands import Result, run_command
+from tests.examples.commands import Result, run_command, synthesize
 from tests.examples.paths import QUADRUPED
 from tests.validation.conftest import TwoWalks
 
@@ -32,7 +32,7 @@ def validate(path: Path, *options: object) -> Result:
 
 def test_synthesize_writes_the_log_of_the_seed(walks: TwoWalks, tmp_path: Path) -> None:
     path = tmp_path / "made.csv"
-    done = run_command("synthesize", *WALK, "--seed", 7, "-o", path)
+    done = synthesize(*WALK, "--seed", 7, "-o", path)
     assert done.code == 0, done.err
     assert path.read_text(encoding="utf-8") == walks.text
     assert "SYNTHETIC" in done.err
@@ -41,7 +41,7 @@ def test_synthesize_writes_the_log_of_the_seed(walks: TwoWalks, tmp_path: Path) 
 def test_the_robot_of_a_log_is_that_of_its_validation_by_default(tmp_path: Path) -> None:
     path, brief = tmp_path / "made.csv", ("--cycles", 2)
     walk = ("--design", "published:A", "--scenario", "1", *brief)
-    done = run_command("synthesize", *walk, "-o", path)
+    done = synthesize(*walk, "-o", path)
     assert done.code == 0, done.err
     assert f"# robot: {DEFAULT_ROBOT}\n" in path.read_text(encoding="utf-8")
     shown, named = (
@@ -139,7 +139,7 @@ def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> N
     assert (
         run_command("validate", measured, "--design", "published:A", "--scenario", "99").code == 2
     )
-    assert run_command("synthesize", *WALK, "-o", tmp_path / "log.txt").code == 2
+    assert synthesize(*WALK, "-o", tmp_path / "log.txt").code == 2
     (tmp_path / "file").write_text("")
     assert validate(measured, "--report", tmp_path / "file").code == 2
 
@@ -150,7 +150,7 @@ def test_a_custom_robot_is_validated_too(
     log = str(tmp_path / "synthetic.csv")
     walk = ["--robot", str(QUADRUPED), "--scenario", str(QUADRUPED / "crawl.json")]
     walk += ["--controller", "pi", "--design", "published:validation"]
-    assert run(["synthesize", *walk, "--output", log]) == 0
+    assert synthesize(*walk, "--output", log).code == 0
     assert run(["validate", log, *walk, "--json"]) == 0
     assert "left_rear" in capsys.readouterr().out
     assert run(["validate", log, *walk[:2], *walk[4:], "--scenario", "1,2"]) == 2

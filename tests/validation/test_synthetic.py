@@ -10,14 +10,14 @@ import pytest
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import Quantity, simulated_log
-from gaitswarm.sim.measurement.synthetic import (
+from gaitswarm.sim.validation import Tolerance, compare
+from scripts.synthesize import (
     Instruments,
     Perturbation,
     converted,
     perturbed,
     synthetic_log,
 )
-from gaitswarm.sim.validation import Tolerance, compare
 from tests.examples.walks import PUBLISHED_A, logged_walk
 from tests.validation.conftest import TwoWalks
 

@@ -1,21 +1,33 @@
 """Synthetic logs: what the instruments of a perturbed twin of a robot would have measured.
 
+    python -m scripts.synthesize --design published:A --scenario 1 --seed 1 --output walk.csv
+
 No log of a real robot is public. Synthetic ones serve to test the toolkit and the identification of
 parameters, whose true values are known here; they say nothing about the accuracy of the model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from pathlib import Path
+from typing import Annotated, Final
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from gaitswarm.cli.commands.measurements import WalkOptions, read_truth
+from gaitswarm.cli.exit_codes import exit_code, explanation
+from gaitswarm.cli.files import replacing
+from gaitswarm.cli.options import Place, expanded
+from gaitswarm.cli.output import note
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import (
     ORIGIN,
     SYNTHETIC,
@@ -27,7 +39,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import AnyActuator, TorqueActuator
 from gaitswarm.sim.robot.description import Contact
-from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from gaitswarm.sim.variables import VariableName
@@ -244,3 +256,60 @@ def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) ->
 def converted(amperes: Floats, step: float) -> Floats:
     """Quantise absolute currents [A] like a 12-bit converter: steps 0 to 4095."""
     return np.clip(np.rint(amperes / step), 0, (1 << ADC_BITS) - 1) * step
+
+
+def synthesize(
+    options: WalkOptions,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE.csv", help="Where to write the log.")
+    ],
+    seed: Annotated[
+        int, typer.Option(min=0, max=(1 << 64) - 1, help="Seed of the sensor noise.")
+    ] = 1,
+    parameters: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="Parameter values by name; the twin differs only in these.",
+        ),
+    ] = None,
+    *,
+    place: Place,
+) -> None:
+    """Write a SYNTHETIC log of a perturbed twin of the robot with sensor noise, for tests."""
+    if output.suffix != ".csv":
+        raise InvalidRequest(f"{output} must end in .csv", field="output")
+    walk = options.read(place)
+    twin = None
+    if parameters is not None:
+        names = {variable.name for variable in identifiable_variables(walk.robot)}
+        values = read_truth(parameters)
+        for name in values:
+            if name not in names:
+                raise InvalidRequest("no such parameter of the robot", field=f"parameters.{name}")
+        twin = Perturbation.of(values)
+    log = synthetic_log(
+        walk.robot, walk.scenario, walk.controller, walk.design, seed=seed, perturbation=twin
+    )
+    with replacing(output, "output") as file:
+        file.write(format_measured_log(log).encode())
+    note(f"SYNTHETIC log of {len(log.time)} rows written to {output}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    app = typer.Typer(pretty_exceptions_enable=False, add_completion=False)
+    app.command()(expanded(synthesize))
+    try:
+        app(arguments, standalone_mode=False)
+    except Exception as error:
+        code = exit_code(error)
+        if code is None:
+            raise
+        note(explanation(error))
+        return code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 # Machines are noisy: how long an example takes says nothing about the code.
 settings.register_profile("gaitswarm", deadline=None)
+settings.register_profile("quick", deadline=None, max_examples=20)
 settings.load_profile("gaitswarm")
 
 
@@ -159,14 +160,19 @@ def serve_database(lasting_server: Server) -> Iterator[Callable[[Path], str]]:
         yield serve
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """Before anything is collected, let alone run."""
+    if "not thorough" in config.getoption("markexpr", ""):
+        settings.load_profile("quick")
     # What is imported and collected lasts: nothing of it is garbage.
     gc.disable()
     # Databases of tests need not survive a power cut: half of their time is waiting for the disk.
     from gaitswarm.services.optimizer.store import engine
 
     vars(engine)["SYNCHRONOUS"] = "OFF"
+    from tests.examples.statements import share_statements
+
+    share_statements()
     # Ray's workers run at normal priority, so that other tests do not starve them.
     os.environ.setdefault("RAY_worker_niceness", "1")
 

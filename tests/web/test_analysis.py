@@ -77,6 +77,7 @@ def test_active_bounds_are_widened_in_the_form(
     expect(page.get_by_label("Lower bound of P")).to_have_value("0.05")
 
 
+@pytest.mark.thorough("test_a_queued_job_has_no_front, on another tab")
 def test_before_the_first_iteration_there_is_nothing_to_analyse(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

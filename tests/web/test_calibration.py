@@ -95,6 +95,7 @@ def test_targets_show_deviation_and_use(
     expect(page.get_by_role("columnheader", name="Left out", exact=True)).to_be_visible()
 
 
+@pytest.mark.thorough("test_targets_show_deviation_and_use")
 def test_choices_are_shown_by_name_everywhere(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
@@ -131,6 +132,7 @@ def test_no_tab_scrolls_horizontally(
     assert overflows == {}
 
 
+@pytest.mark.thorough("test_a_clone_has_the_same_spec, of another kind of job")
 def test_it_is_cloned_as_json(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:

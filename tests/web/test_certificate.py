@@ -73,6 +73,7 @@ def test_tables_show_utilities_and_link_to_worlds(
     assert f"particle={worst['particle']}" in page.url
 
 
+@pytest.mark.thorough("test_tables_show_utilities_and_link_to_worlds")
 def test_another_engine_has_a_separate_table(
     server: ServerProcess, certificate: str, visit: Callable[..., Visit]
 ) -> None:
@@ -99,6 +100,7 @@ def test_another_engine_has_a_separate_table(
     expect(page.get_by_text("this walk was simulated by mujoco")).to_be_visible()
 
 
+@pytest.mark.thorough("test_a_queued_job_has_no_front, of another kind of job")
 def test_a_queued_certificate_has_an_empty_state(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

@@ -58,6 +58,7 @@ def test_the_surface_is_drawn_with_the_values_of_the_api(
     expect(heat).not_to_have_attribute("data-value", under_pointer)
 
 
+@pytest.mark.thorough("test_the_surface_is_drawn_with_the_values_of_the_api")
 def test_a_controller_without_rules_is_shown_by_its_gains(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

@@ -85,6 +85,7 @@ def test_a_chart_is_exported_as_numbers_and_pictures(
     assert int.from_bytes(picture[16:20]) == 2 * int(drawing.get("width", "0"))
 
 
+@pytest.mark.thorough("test_a_chart_is_exported_as_numbers_and_pictures")
 def test_parallel_coordinates_export_every_design(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
@@ -99,6 +100,7 @@ def test_parallel_coordinates_export_every_design(
     expect(page.get_by_role("menu")).to_have_count(0)
 
 
+@pytest.mark.thorough("test_a_chart_is_exported_as_numbers_and_pictures")
 def test_limiting_factors_are_exported_with_column_names(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:

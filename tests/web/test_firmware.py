@@ -57,6 +57,7 @@ def test_memory_use_is_shown_and_firmware_is_downloaded(
         )
 
 
+@pytest.mark.thorough("test_a_queued_job_has_no_front, on another tab")
 def test_a_job_without_a_winner_has_no_firmware(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
@@ -66,6 +67,7 @@ def test_a_job_without_a_winner_has_no_firmware(
     expect(page.get_by_role("link", name="Download")).to_have_count(0)
 
 
+@pytest.mark.thorough("test_an_error_can_be_retried, on another tab")
 def test_an_error_is_shown(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

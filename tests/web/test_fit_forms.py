@@ -163,6 +163,7 @@ def test_errors_of_a_log_are_shown_at_its_field(
     expect(page.get_by_label("Log")).to_have_accessible_description(message)
 
 
+@pytest.mark.thorough("test_a_log_is_uploaded_and_an_identification_submitted")
 def test_parameters_of_a_custom_robot_are_those_of_its_legs(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]
 ) -> None:

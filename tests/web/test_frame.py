@@ -43,6 +43,7 @@ def test_titles_name_the_job_and_its_progress(
     expect(page).to_have_title("small · queued 0/6 · gaitswarm")
 
 
+@pytest.mark.thorough("test_titles_name_the_job_and_its_progress")
 def test_titles_and_breadcrumbs_name_the_content(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -82,6 +83,7 @@ def endless_job(server: ServerProcess) -> Iterator[str]:
     server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
+@pytest.mark.thorough("test_titles_name_the_job_and_its_progress")
 def test_the_title_of_a_walk_shows_the_progress_of_its_job(
     server: ServerProcess, endless_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -173,6 +175,7 @@ def test_a_zoom_stays_while_iterations_arrive(
     assert chart_range(page)[0] == 0.0
 
 
+@pytest.mark.thorough("test_a_zoom_stays_while_iterations_arrive")
 def test_the_zoom_of_a_recreated_chart_can_be_reset(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -185,6 +188,7 @@ def test_the_zoom_of_a_recreated_chart_can_be_reset(
     expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
 
 
+@pytest.mark.thorough("test_filters_order_and_search_are_in_the_address")
 def test_a_new_order_starts_on_the_first_page(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
@@ -205,6 +209,7 @@ def test_a_new_order_starts_on_the_first_page(
     expect(page.get_by_role("columnheader", name="Mean")).to_be_hidden()
 
 
+@pytest.mark.thorough("test_brushing_an_axis_selects_designs")
 def test_bounds_of_a_selection_in_the_wrong_order_are_swapped(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

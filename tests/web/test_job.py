@@ -161,6 +161,7 @@ def test_a_job_is_extended_and_cloned(server: ServerProcess, visit: Callable[...
     expect(page.locator("[data-custom]")).to_have_count(2)
 
 
+@pytest.mark.thorough("test_a_jobs_headline_convergence_winner_and_walk")
 def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
@@ -247,6 +248,7 @@ def test_a_clone_has_the_same_spec(server: ServerProcess, visit: Callable[..., V
     assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
 
 
+@pytest.mark.thorough("test_a_job_is_submitted_watched_paused_reloaded_and_resumed")
 def test_the_form_offers_robots_and_collapses_conventions(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

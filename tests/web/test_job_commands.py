@@ -174,6 +174,7 @@ def test_the_priority_is_set_in_the_form_and_changed_on_the_page(
     expect(page.get_by_role("row").filter(has_text=job_id)).to_contain_text("-4")
 
 
+@pytest.mark.thorough("test_the_priority_is_set_in_the_form_and_changed_on_the_page")
 def test_a_response_older_than_a_command_is_ignored(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_fork_and_its_parent_link_to_each_other(
     expect(row).to_contain_text(f"fork of {finished_job}")
 
 
+@pytest.mark.thorough("test_a_fork_and_its_parent_link_to_each_other")
 def test_no_button_moves_when_the_forks_are_loaded(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

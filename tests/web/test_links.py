@@ -95,6 +95,7 @@ def test_shortcuts_find_jobs_and_commands_and_can_be_disabled(
     expect(page).to_have_url(re.compile("/jobs/new$"))
 
 
+@pytest.mark.thorough("test_a_link_reproduces_the_view")
 def test_a_link_shows_a_walk_at_a_time(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     camera = "0.9:-1.3:0.6:0.1:0:0"
     page = visit(server.url).go(f"/walk?t=1.25&view=no-trail&zoom=0.5:1.5&camera={camera}")
@@ -115,6 +116,7 @@ def test_a_link_shows_a_walk_at_a_time(server: ServerProcess, visit: Callable[..
     expect(page).not_to_have_url(re.compile("camera="))
 
 
+@pytest.mark.thorough("test_a_link_reproduces_the_view")
 def test_the_manual_is_linked_if_available(
     start_server: Callable[..., Server], visit: Callable[..., Visit], tmp_path: Path
 ) -> None:

@@ -148,6 +148,7 @@ def test_selected_jobs_are_compared(
     expect(shares.locator("tbody tr").first).to_contain_text(f"{best:.3f}"[:5])
 
 
+@pytest.mark.thorough("test_selected_jobs_are_compared")
 def test_a_comparison_follows_its_jobs(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
@@ -165,6 +166,7 @@ def test_a_comparison_follows_its_jobs(
     expect(page).to_have_title("small · compared · gaitswarm")
 
 
+@pytest.mark.thorough("test_an_error_can_be_retried, of a comparison")
 def test_errors_of_a_comparison_are_shown(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

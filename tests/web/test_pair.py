@@ -18,6 +18,7 @@ pytestmark = pytest.mark.slow
 MAP = re.compile("designs by .* and ")
 
 
+@pytest.mark.thorough("test_brushing_an_axis_selects_designs")
 def test_a_box_selects_in_all_charts_and_in_the_table(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -79,6 +80,7 @@ def test_ranks_are_shown_by_cell_and_axes_may_be_objectives(
     expect(cells.first).to_contain_text(" to ")
 
 
+@pytest.mark.thorough("test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front")
 def test_a_clicked_design_is_highlighted_in_the_table(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -32,7 +32,7 @@ def shown_job(server: ServerProcess, finished_job: str) -> str:
     return job_id
 
 
-@pytest.mark.variants("job-*")
+@pytest.mark.thorough("pictures of the manual")
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     ("name", "scheme"),

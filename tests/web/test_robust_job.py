@@ -71,6 +71,7 @@ def test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec(
     assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
 
 
+@pytest.mark.thorough("test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec")
 def test_other_jobs_are_not_described_as_robust(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

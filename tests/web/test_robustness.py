@@ -43,6 +43,7 @@ def test_the_index_is_drawn_and_listed(
     expect(sensitive.nth(1)).to_contain_text(most)
 
 
+@pytest.mark.thorough("test_a_queued_job_has_no_front, on another tab")
 def test_a_job_without_a_winner_has_no_index(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

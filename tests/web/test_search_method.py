@@ -54,6 +54,7 @@ def test_a_method_is_configured_in_the_form_and_shown_with_its_job(
     assert setting(page, "memory") == ["10", "the same"]
 
 
+@pytest.mark.thorough("test_a_method_is_configured_in_the_form_and_shown_with_its_job")
 def test_the_budget_of_a_job_with_small_iterations_is_counted_in_designs(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

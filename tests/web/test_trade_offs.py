@@ -70,6 +70,7 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed(
     expect(page).to_have_url(re.compile(rf"/walk\?job={finished_job}&iteration="))
 
 
+@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_and_listed")
 def test_published_designs_are_simulated_on_request_and_listed(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -84,6 +85,7 @@ def test_published_designs_are_simulated_on_request_and_listed(
     expect(rows).to_have_text(["published A", "published B", "published C"])
 
 
+@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_and_listed")
 def test_winners_by_preference_and_the_hypervolume_are_shown(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -153,6 +155,7 @@ def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
     }
 
 
+@pytest.mark.thorough("test_the_preference_for_a_design_ranks_the_history_and_starts_a_job")
 def test_a_missing_design_is_reported(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -135,6 +135,7 @@ def test_palette_and_dialogs_are_accessible(
     assert {check: elements for check, elements in violations.items() if elements} == {}
 
 
+@pytest.mark.thorough("the other theme")
 def test_the_theme_follows_the_system_until_it_is_chosen(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

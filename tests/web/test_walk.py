@@ -182,7 +182,7 @@ def holds_one_leg_still(walk: Recording) -> bool:
     return [max(leg) < 0.05 for leg in walk.travel()].count(True) == 1
 
 
-@pytest.mark.variants("drop-*")
+@pytest.mark.thorough("test_a_replay_can_be_scrubbed_stepped_and_played, of other scenarios")
 @pytest.mark.parametrize(
     ("scenario", "shows"),
     [
@@ -231,6 +231,7 @@ def test_two_walks_are_compared(
     painted(stage, other_than(ghost))
 
 
+@pytest.mark.thorough("test_a_replay_can_be_scrubbed_stepped_and_played")
 def test_a_failed_walk_shows_the_reason(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     page = visit(server.url).go('/walk?controller=p&design={"P":0}')
 

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.slow
 OBJECTIVES = ("torque", "acceleration", "angular acceleration", "energy", "reciprocal speed")
 
 
+@pytest.mark.thorough("test_another_preference_ranks_the_history_without_simulation")
 def test_the_preference_of_chapter_3_weights_a_sixth_objective(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -36,6 +36,7 @@ def test_each_scenario_is_left_out_and_the_smallest_set_starts_a_job(
     expect(page.locator("[data-custom]")).to_have_count(len(smallest["scenarios"]))
 
 
+@pytest.mark.thorough("test_each_scenario_is_left_out_and_the_smallest_set_starts_a_job")
 def test_a_job_with_one_scenario_has_an_empty_state(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

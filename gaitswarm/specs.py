@@ -5,9 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeAlias, TypedDict, TypeVar, Unpack, cast, overload
 
@@ -55,34 +53,12 @@ SpecInput: TypeAlias = Spec | Document
 
 
 class SpecOptions(TypedDict, total=False):
-    """Fields of a job's spec as keywords; the defaults are the job of the thesis's chapter 4.
+    """Fields of a `JobSpec` as keywords; the defaults are the job of the thesis's chapter 4.
 
-    Attributes:
-        name: Name of the job, for people.
-        robot: Robot to simulate: a shipped one by name, a `RobotVariant`, or the folder that holds
-            robot.toml and robot.urdf of another, whose job.json has further defaults.
-        controller: Motor controller to tune.
-        scenarios: Scenarios in which every design is judged; one, or several.
-        variables: Variables to search: names, with the catalogue's bounds, or `Variable` with
-            others. Default: all that the controller has, less `fixed`.
-        fixed: Variables held at one value, by name, in their units; a categorical one at a choice's
-            name.
-        preference: How objectives are weighed.
-        optimizer: Search method: a name of `gaitswarm.optimizers()`, settings such as
-            `PsoSettings`, or a document of some, `{"name": "pso", "inertia_end": 0.4}`; what it
-            does not set has the method's default.
-        particles: Designs of one iteration, at most, in place of `optimizer`'s.
-        iterations: Budget, in iterations of `particles` designs each.
-        seed: Source of all randomness; the same seed gives the same bits.
-        start: Designs to judge first, and to start the search from if its method can:
-            values by name, a CSV file, or the ids of earlier jobs, separated by commas, for their
-            five best; `{"jobs": [ID, ...], "count": N}` for another number.
-        precision: Of the search's physics; the best design is always judged in
-            double.
-        case: Evaluation of designs in place of gaitswarm's simulator: a plug-in's case by
-            name, or its settings, `{"name": "mujoco-walk", "rate": 2000}`.
-        worlds: `TuningWorlds`, or a document of it, to judge every design in perturbed worlds.
-
+    Besides the values of a document, `robot` takes a folder with robot.toml and robot.urdf, whose
+    job.json has further defaults; `scenarios` a single one; `optimizer` settings such as
+    `PsoSettings`; and `start` a CSV file, or ids of earlier jobs, separated by commas, for their
+    five best designs. `particles` replaces those of `optimizer`.
     """
 
     name: str
@@ -103,21 +79,7 @@ class SpecOptions(TypedDict, total=False):
 
 
 class ForkOptions(TypedDict, total=False):
-    """Fields in which a fork differs from its parent, as keywords.
-
-    Attributes:
-        name: Name of the job, for people.
-        preference: How objectives are weighed.
-        optimizer: Search method, as in `SpecOptions`; what it does not set has the method's
-            default.
-        particles: Designs of one iteration, at most, in place of `optimizer`'s.
-        scenarios: Scenarios in which every design is judged; one, or several.
-        robot: Robot to simulate.
-        iterations: Budget in all, with the iterations that the fork begins with.
-        start_count: Designs to start from where the search's state cannot be continued; default 5.
-        accept_changes: Whether to continue the parent's iterations although its provenance
-            has changed since.
-    """
+    """Fields of a `ForkRequest` as keywords, with the values of `SpecOptions`."""
 
     name: str
     preference: PreferenceInput
@@ -189,12 +151,8 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
         settings = given.get("optimizer", document.get("optimizer", {}))
         given["optimizer"] = with_settings(settings, {"particles": given.pop("particles")})
     document = _folder_defaults(options.get("robot"), document | given) | document
-    file = None
     if isinstance(given.get("start"), str | os.PathLike):
         given["start"] = start_from(given["start"])
-    if isinstance(given.get("start"), StartFile):
-        file = given["start"]
-        given["start"] = file.designs
     document |= given
     try:
         combined = SPECS.validate_python(document)
@@ -202,8 +160,7 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
             raise InvalidRequest("must be a number", field=".".join(map(str, where)))
         return combined
     except ValidationError as error:
-        refused = invalid_request(error, AnySpec)
-        raise (refused if file is None else file.located(refused)) from error
+        raise invalid_request(error, AnySpec) from error
 
 
 def _folder_defaults(robot: RobotInput | None, document: Mapping[str, Any]) -> dict[str, Any]:
@@ -254,34 +211,12 @@ _DESIGN: Final = "design."
 
 _FITNESS: Final = "fitness"
 
-_PLACE: Final = re.compile(r"start\.(\d+)(?:\.(\w+))?")
-
 Design = dict[str, float | str]
-
-
-@dataclass(frozen=True, slots=True)
-class StartFile:
-    """Designs of a CSV file, in the order in which a search is to begin with them."""
-
-    path: Path
-    lines: tuple[int, ...]  # where each design ends in the file, from 1
-    designs: tuple[Design, ...]
-
-    def located(self, error: InvalidRequest) -> InvalidRequest:
-        """Add the place in the file to an error."""
-        place = _PLACE.fullmatch(error.field)
-        if place is None:
-            return error
-        index, column = int(place[1]), place[2]
-        where = f"{self.path}, line {self.lines[index]}"
-        where += f", column {column}" if column else ""
-        message = str(error).removeprefix(f"{error.field}: ")
-        return InvalidRequest(f"{where}: {message}", field="start")
 
 
 def start_from(
     source: str | os.PathLike[str], count: int | None = None
-) -> StartFile | dict[str, Any]:
+) -> tuple[Design, ...] | dict[str, Any]:
     """Start designs from a file or from identifiers of jobs."""
     if count is not None and count < 1:
         raise InvalidRequest("must be at least 1", field="start_count")
@@ -296,7 +231,7 @@ def start_from(
     return {"jobs": ids} if count is None else {"jobs": ids, "count": count}
 
 
-def read_designs(path: Path, count: int | None = None) -> StartFile:
+def read_designs(path: Path, count: int | None = None) -> tuple[Design, ...]:
     """Read designs from a CSV file: one row a design, one column a variable.
 
     A file of `gaitswarm export` works: its columns that begin with `design.` are the
@@ -310,21 +245,18 @@ def read_designs(path: Path, count: int | None = None) -> StartFile:
     except (csv.Error, UnicodeDecodeError) as error:
         raise InvalidRequest(f"{path} is not a CSV file: {error}", field="start") from error
     rows.sort(key=lambda row: row[0])
-    different: dict[tuple[Any, ...], tuple[int, Design]] = {}
-    for _, line, design in rows:
-        different.setdefault(tuple(design.items()), (line, design))
+    different = dict.fromkeys(tuple(design.items()) for _, design in rows)
     if not different:
         raise InvalidRequest(
             f"{path} has no designs; its first line names variables, and every other line is a"
             " design",
             field="start",
         )
-    lines, designs = zip(*different.values(), strict=True)
-    return StartFile(path, lines[:count], designs[:count])
+    return tuple(dict(design) for design in different)[:count]
 
 
-def _rows(reader: csv.DictReader[str]) -> Iterator[tuple[float, int, Design]]:
-    """Yield fitness, line and design; a file without fitness is in order."""
+def _rows(reader: csv.DictReader[str]) -> Iterator[tuple[float, Design]]:
+    """Yield fitness and design; a file without fitness is in order."""
     names = list(reader.fieldnames or ())
     exported = any(name.startswith(_DESIGN) for name in names)
     for cells in reader:
@@ -337,7 +269,7 @@ def _rows(reader: csv.DictReader[str]) -> Iterator[tuple[float, int, Design]]:
                 design[name.removeprefix(_DESIGN)] = _value(text)
         fitness = _value((cells[_FITNESS] or "nan").strip()) if _FITNESS in names else 0.0
         if isinstance(fitness, float) and math.isfinite(fitness):
-            yield fitness, reader.line_num, design
+            yield fitness, design
 
 
 def _value(text: str) -> float | str:

@@ -36,8 +36,8 @@ from gaitswarm.jobs.operation import (
     PageLimit,
     SearchText,
     analysis,
+    commands,
     core,
-    operations,
     robots,
 )
 from gaitswarm.recordings import RecordingEntryView, RecordingView
@@ -429,11 +429,7 @@ class Jobs(ABC):
 
     @core("GET /jobs/{job_id}", "get_job", "Get a job")
     def job(self, job_id: str) -> JobView:
-        """Return a job as it is now, with its spec.
-
-        Returns:
-            State, progress, rates, estimated time left, best design and error.
-        """
+        """Return a job as it is now, with its spec."""
         return job_view(self._service, self._service.job(job_id))
 
     @core("POST /jobs/{job_id}/pause", "pause_job", "Pause a job", access="command", status=202)
@@ -479,10 +475,11 @@ class Jobs(ABC):
         return self._command(job_id, Command.CANCEL)
 
     def _command(self, job_id: str, command: Command, **options: Any) -> JobView:
-        job = self._service.store.command(
-            job_id, command, actor=self._context.actor, quota=self._context.quota, **options
-        )
-        return job_view(self._service, job)
+        change = self._service.store.command
+        return self._changed(change, job_id, command, quota=self._context.quota, **options)
+
+    def _changed(self, change: Callable[..., Job], *arguments: Any, **options: Any) -> JobView:
+        return job_view(self._service, change(*arguments, actor=self._context.actor, **options))
 
     @core(
         "POST /jobs/{job_id}/extend",
@@ -510,22 +507,16 @@ class Jobs(ABC):
         Raises:
             Conflict: It was cancelled.
         """
-        actor, quota = self._context.actor, self._context.quota
-        job = self._service.extend(job_id, iterations, actor=actor, quota=quota)
-        return job_view(self._service, job)
+        quota = self._context.quota
+        return self._changed(self._service.extend, job_id, iterations, quota=quota)
 
-    @operations(
+    @commands(
         "PUT /jobs/{job_id}/priority",
         "prioritize_job",
         "Change the priority of a job",
-        access="command",
         body="PriorityRequest",
     )
-    def prioritize(
-        self,
-        job_id: str,
-        priority: Priority,
-    ) -> JobView:
+    def prioritize(self, job_id: str, priority: Priority) -> JobView:
         """Change the priority of a job that has not ended.
 
         Queued jobs start in order of priority, the oldest first among equals. Each step doubles a
@@ -540,16 +531,12 @@ class Jobs(ABC):
             Conflict: It has ended.
         """
         self._context.check_priority(priority)
-        actor = self._context.actor
-        return job_view(
-            self._service, self._service.store.prioritize(job_id, priority, actor=actor)
-        )
+        return self._changed(self._service.store.prioritize, job_id, priority)
 
-    @operations(
+    @commands(
         "PATCH /jobs/{job_id}",
         "label_job",
         "Change name, note, tags or archival of a job",
-        access="command",
         body=LabelsChange,
     )
     def label(
@@ -572,26 +559,19 @@ class Jobs(ABC):
         """
         words = None if tags is None else tuple(tags)
         change = LabelsChange(name=name, note=note, tags=words, archived=archived)
-        actor = self._context.actor
-        return job_view(self._service, self._service.store.label(job_id, change, actor=actor))
+        return self._changed(self._service.store.label, job_id, change)
 
-    @operations(
-        "PUT /jobs/{job_id}/keep", "keep_job", "Protect a job from deletion", access="command"
-    )
+    @commands("PUT /jobs/{job_id}/keep", "keep_job", "Protect a job from deletion")
     def keep(self, job_id: str) -> JobView:
         """Protect a job from deletion by users and by retention."""
-        actor = self._context.actor
-        return job_view(self._service, self._service.store.keep(job_id, kept=True, actor=actor))
+        return self._changed(self._service.store.keep, job_id, kept=True)
 
-    @operations(
-        "DELETE /jobs/{job_id}/keep", "release_job", "End the protection of a job", access="command"
-    )
+    @commands("DELETE /jobs/{job_id}/keep", "release_job", "End the protection of a job")
     def release(self, job_id: str) -> JobView:
         """Allow deletion; a server with a retention time deletes the job when that has passed."""
-        actor = self._context.actor
-        return job_view(self._service, self._service.store.keep(job_id, kept=False, actor=actor))
+        return self._changed(self._service.store.keep, job_id, kept=False)
 
-    @operations("DELETE /jobs/{job_id}", "delete_job", "Delete a job", access="command", status=204)
+    @commands("DELETE /jobs/{job_id}", "delete_job", "Delete a job", status=204)
     def delete(self, job_id: str) -> None:
         """Delete a job with its iterations and evaluations, irrevocably.
 
@@ -617,11 +597,7 @@ class Jobs(ABC):
         return self._follow(job_id, after, Stop())
 
     def wait(self, job_id: str) -> JobView:
-        """Wait until a job has ended, also while it is paused.
-
-        Returns:
-            The job; its `state` says how it ended.
-        """
+        """Wait until a job has ended, also while it is paused."""
         for _ in self.follow(job_id, after=self.job(job_id).last_iteration):
             pass
         return self.job(job_id)
@@ -629,9 +605,6 @@ class Jobs(ABC):
     @core("GET /jobs/{job_id}/best", "get_best", "Get the best design")
     def best(self, job_id: str) -> BestView:
         """Return the best design of a job so far.
-
-        Returns:
-            The design of least fitness, with its results in every case.
 
         Raises:
             NotFound: No design is feasible in every scenario yet.
@@ -664,11 +637,7 @@ class Jobs(ABC):
         return PageView[IterationView](items=items, next=page.next)
 
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """List the committed iterations of a job with every design.
-
-        Returns:
-            Iterations in order, each with its evaluations.
-        """
+        """List the committed iterations of a job with every design."""
         for iteration in self.iterations(job_id):
             evaluations = self._evaluations(job_id, iteration.index)
             yield HistoryIterationView(**dict(iteration), evaluations=evaluations.items)
@@ -692,11 +661,7 @@ class Jobs(ABC):
         return CatalogueView(items=evaluation_views(evaluations, spec))
 
     def evaluations(self, job_id: str) -> EvaluationTable:
-        """Return every evaluation of a job at once, as arrays.
-
-        Returns:
-            One row per evaluation: design, fitness, and status, utility and objectives by case.
-        """
+        """Return every evaluation of a job at once, as arrays."""
         spec = self.job(job_id).spec
         read = partial(EvaluationTable.from_parquet, spec)
         return self._decoded(read, b"".join(self.export(job_id, "parquet")))
@@ -714,9 +679,6 @@ class Jobs(ABC):
             preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
                 `Preference`.
             top: How many of the best designs to list, 1 to 1000.
-
-        Returns:
-            The best designs with their previous ranks, and how far the rankings agree.
         """
         job = self._service.job(job_id)
         if not isinstance(job.spec, JobSpec):
@@ -742,9 +704,6 @@ class Jobs(ABC):
         Args:
             tolerance: Largest regret of the smallest family of scenarios, as a share.
 
-        Returns:
-            The best designs that the job would have had without each scenario, and with few.
-
         Raises:
             Conflict: No design of it succeeds in all scenarios.
         """
@@ -762,21 +721,13 @@ class Jobs(ABC):
 
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> FailuresView:
-        """Count the failed designs of a job by case and status, from stored statuses.
-
-        Returns:
-            Cases with failures, most failures first; each status with its latest design.
-        """
+        """Count the failed designs of a job by case and status, from stored statuses."""
         job = self._service.job(job_id)
         return failures(self._service.columns(job), job.spec.case_names)
 
     @analysis("GET /jobs/{job_id}/importance", "get_importance", "Get the importance of variables")
     def importance(self, job_id: str) -> ImportanceView:
         """Determine which variables of a job matter, from stored objectives.
-
-        Returns:
-            First-order Sobol' indices of every variable for the fitness, for each objective and for
-            failure, with intervals; and whether the best design lies at a bound.
 
         Raises:
             Conflict: It has no design yet.
@@ -805,10 +756,6 @@ class Jobs(ABC):
 
         Args:
             job_ids: 1 to 12 jobs, each once.
-
-        Returns:
-            Their convergence by iterations, evaluations and time, the distribution of fitness of
-            their designs, and how their specs differ.
         """
         if len(set(job_ids)) < len(job_ids):
             raise InvalidRequest("must name each job once", field="job_ids")
@@ -849,9 +796,6 @@ class Jobs(ABC):
             seed: Of preferences and samples.
             precision: Of the physics.
 
-        Returns:
-            The candidates, the most robust first; without simulations those of most preferences.
-
         Raises:
             Conflict: No design of it succeeds in all scenarios.
         """
@@ -882,9 +826,6 @@ class Jobs(ABC):
             most: Maximum number of designs to list, 1 to 10 000; of more, marked designs and others
                 that cover the front evenly.
 
-        Returns:
-            The front with its knees, extremes and winners, and its hypervolume by iteration.
-
         Raises:
             Conflict: No design of it succeeds in all scenarios.
         """
@@ -902,9 +843,6 @@ class Jobs(ABC):
         Args:
             iteration: Iteration of the design, from 0.
             particle: Number of the design in its iteration, from 0.
-
-        Returns:
-            The best preference for each set of biases, with the design's rank under it.
 
         Raises:
             NotFound: The job has no such design.
@@ -932,9 +870,6 @@ class Jobs(ABC):
         Args:
             job_ids: Jobs that differ in name, seed, optimizer and iterations alone; at least one.
 
-        Returns:
-            Intervals of every variable among designs within twelve thresholds of the best.
-
         Raises:
             Conflict: One of them has no feasible design yet.
         """
@@ -956,9 +891,6 @@ class Jobs(ABC):
                 least one.
             leave_out: `target` to predict every target by the design that is best without it,
                 `walk` for without all targets of its simulation; nothing is simulated.
-
-        Returns:
-            The values of every target for the best design of all runs, and the predictions.
 
         Raises:
             Conflict: One of them has no feasible design yet.
@@ -997,9 +929,6 @@ class Jobs(ABC):
         Args:
             worlds: Number of worlds, from the first; by default all that were simulated.
             most: Number of worst worlds to list, 0 to 1000.
-
-        Returns:
-            Failure rates, spreads by scenario, the worst worlds, and what correlates with them.
 
         Raises:
             Conflict: No world was simulated yet.
@@ -1083,9 +1012,6 @@ class Jobs(ABC):
             head: Digest of an iteration noted earlier, as `JobView.head`, that must be in the
                 history.
 
-        Returns:
-            Up to which iteration the digests are right, and the first difference.
-
         Raises:
             EvaluatorUnavailable: Simulations cannot be run there.
         """
@@ -1112,9 +1038,6 @@ class Jobs(ABC):
 
         Args:
             walk: Motor currents of a measured walk. The same walk again is the same recording.
-
-        Returns:
-            The recording's id, and a summary of the walk.
         """
         recording_id = self._service.store.add_recording(walk, actor=self._context.actor)
         return RecordingView.from_walk(recording_id, walk)
@@ -1143,9 +1066,6 @@ class Jobs(ABC):
 
         Args:
             recording_id: Identifier, as `record` returned it.
-
-        Returns:
-            The walk as it was given.
 
         Raises:
             Conflict: The recording cannot be read.

@@ -7,7 +7,6 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
-from email.utils import parsedate_to_datetime
 from http import HTTPStatus
 from socket import SHUT_RDWR
 from typing import Any, Final, TypeVar, get_origin
@@ -380,12 +379,7 @@ def error_of(response: httpx2.Response) -> GaitswarmError:
 
 def _retry_after(response: httpx2.Response) -> float:
     """Return the pause that the server wants [s]; 0 if none."""
-    text = response.headers.get("Retry-After", "")
     try:
-        return max(0.0, float(text))
-    except ValueError:
-        pass
-    try:
-        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
+        return max(0.0, float(response.headers.get("Retry-After", "")))
     except ValueError:
         return 0.0

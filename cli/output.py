@@ -15,16 +15,24 @@ from gaitswarm.cli.exit_codes import OutputFailed
 if TYPE_CHECKING:
     from pydantic import BaseModel
     from rich.console import Console
+    from rich.table import Table
 
 
 class OutputClosed(Exception):
     """The reader of standard output closed it, as `head` does."""
 
 
-def stdout_console() -> Console:
+def print_table(table: Table) -> None:
+    """Print a table without cutting words; the terminal wraps lines that are too long."""
     from rich.console import Console
+    from rich.measure import Measurement
 
-    return Console(file=sys.stdout, highlight=False, soft_wrap=True)
+    console = Console(file=sys.stdout, highlight=False, markup=False, soft_wrap=True)
+    wide = console.options.update(width=1000)
+    for column in table.columns:
+        cells = (column.header, *column.cells)
+        column.min_width = max(Measurement.get(console, wide, cell).minimum for cell in cells)
+    console.print(table)
 
 
 def stderr_console() -> Console:
@@ -61,13 +69,11 @@ def show(document: Any, parts: Iterable[Any] | str, *, as_json: bool) -> None:
     if as_json:
         print_document(document)
         return
-    console = None
     for part in [parts] if isinstance(parts, str) else parts:
         if isinstance(part, str):
             print_text(part)
         else:
-            console = console or stdout_console()
-            console.print(part)
+            print_table(part)
 
 
 def print_document(document: Any) -> None:

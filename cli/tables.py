@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 from gaitswarm.cli.output import Parts
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.rich_table import Table
+    from rich.table import Table
+
     from gaitswarm.services.optimizer.analysis.evaluations import (
         EvaluationView,
         ObjectiveView,
@@ -61,15 +62,13 @@ def table(
     rows: of texts, integers, floats with four digits, None for a missing value, or pairs of text
         and style.
     """
-    from gaitswarm.cli.rich_table import Table
+    from rich.table import Table
 
     made = Table(box=None, title=title, title_justify="left", padding=(0, gap, 0, 0))
     made.show_header = headings is not None
     for index, heading in enumerate(headings or ()):
         left = heading.startswith("<") or not index
-        made.add_column(
-            heading.removeprefix("<"), justify="left" if left else "right", no_wrap=not index
-        )
+        made.add_column(heading.removeprefix("<"), justify="left" if left else "right")
     for row in rows:
         made.add_row(*map(_cell, row), style="bold" if isinstance(row, Bold) else None)
     return made

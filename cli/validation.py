@@ -14,7 +14,8 @@ from gaitswarm.sim.measurement.measured_log import Quantity
 from gaitswarm.sim.validation import Tolerance
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.rich_table import Table
+    from rich.table import Table
+
     from gaitswarm.sim.measurement.measured_log import Synchronised
     from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison
 

@@ -28,7 +28,8 @@ from gaitswarm.cli.tables import MISSING, SHORT, Bold, number, results_table, ta
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.rich_table import Table
+    from rich.table import Table
+
     from gaitswarm.services.optimizer.analysis.certificate import (
         CertificateView,
         ComparedEngineView,

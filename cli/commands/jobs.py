@@ -23,7 +23,7 @@ from gaitswarm.cli.options import (
     completed,
     one_of,
 )
-from gaitswarm.cli.output import Parts, Printed, note, print_text, write_json_items
+from gaitswarm.cli.output import Parts, Printed, note, print_table, print_text, write_json_items
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
@@ -206,7 +206,6 @@ def history(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
 
     With --json, also every design: values, fitness, statuses and raw objectives.
     """
-    from gaitswarm.cli.output import stdout_console
     from gaitswarm.cli.tables import number, table
 
     with place.open() as jobs:
@@ -222,7 +221,7 @@ def history(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
             for i in jobs.iterations(job_id)
         ]
     headings = (">iteration", "best so far", "best", "mean", "median", "worst", "failed", "seconds")
-    stdout_console().print(table(headings, rows))
+    print_table(table(headings, rows))
 
 
 def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:

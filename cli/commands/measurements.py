@@ -26,7 +26,8 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.near_names import instead_of
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.rich_table import Table
+    from rich.table import Table
+
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.services.optimizer.analysis.identifiability import (
         IdentifiabilityView,

@@ -78,7 +78,12 @@ def test_robustness_is_by_the_bounds_of_the_folders_variables(tmp_path: Path) ->
     found = run_command(*asked)
     assert found.code == 0, found.err
     known = {v["name"]: v for v in found.json["variables"]}
-    assert (known["P"]["low"], known["P"]["high"]) == (0.1, 1.0)
+    # The sample extends by 0.02 of the bounds, 0.1 to 1, to both sides.
+    assert (known["P"]["least"], known["P"]["most"]) == (
+        pytest.approx(0.4, abs=0.018),
+        pytest.approx(0.4, abs=0.018),
+    )
+    assert known["P"]["most"] - known["P"]["least"] > 0.01
 
 
 def test_an_unpublished_design_lists_the_choices(dog: Path) -> None:

@@ -12,7 +12,7 @@ from gaitswarm.services.optimizer.access import Scope
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.audit import AuditAction
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.store import Store, tokens
+from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_recordings import recording
 
@@ -113,9 +113,8 @@ def test_a_recording_is_noted_when_it_is_new(store: Store) -> None:
 
 
 def test_old_entries_are_removed_and_their_numbers_not_given_again(
-    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch
+    store: Store, clock: Clock
 ) -> None:
-    monkeypatch.setattr(tokens, "_AT_ONCE", 2)
     for _ in range(5):
         store.create_job(spec())
     clock.advance(60.0)

@@ -1,7 +1,8 @@
-"""Backups while jobs run, and what becomes of them: the same rows on either database."""
+"""Backups while jobs run, and their restoration: the same rows on either database."""
 
 from __future__ import annotations
 
+import shutil
 import threading
 from contextlib import closing
 from pathlib import Path
@@ -33,6 +34,12 @@ def content(url: str) -> Content:
 
 
 @pytest.fixture
+def database_url(migrated_sqlite: Path, tmp_path: Path) -> str:
+    """Backups are of SQLite."""
+    return f"sqlite:///{shutil.copy(migrated_sqlite, tmp_path / 'jobs.db')}"
+
+
+@pytest.fixture
 def filled(store: Store, database_url: str) -> Content:
     """What a database holds with jobs in several states."""
     claim = begun(store)
@@ -55,6 +62,11 @@ def test_a_backup_is_restored_row_by_row_on_either_database(
     restore(fresh_url, file)
     assert content(fresh_url) == filled
     assert check(fresh_url) == []
+    give_up_leases(fresh_url)
+    with pytest.raises(Conflict, match="--force replaces all"):
+        restore(fresh_url, file)
+    restore(fresh_url, file, overwrite=True)
+    assert content(fresh_url) == filled
     assert file.read_bytes() == before
     # Numbers go on where those of the backup end.
     with closing(open_store(fresh_url)) as store:
@@ -104,6 +116,11 @@ def test_nothing_is_replaced_unless_that_is_asked_for(
         restore(database_url, file)
     restore(database_url, file, overwrite=True)
     assert content(database_url) == filled
+
+
+def test_a_server_has_backups_of_its_own(tmp_path: Path) -> None:
+    with pytest.raises(InvalidRequest, match="pg_dump"):
+        backup("postgresql://user@localhost/jobs", tmp_path / "backup.db")
 
 
 def give_up_leases(url: str) -> None:

@@ -131,6 +131,7 @@ def test_a_paused_job_is_deleted_with_its_outstanding_ask(store: Store, database
     claim = begun(store)
     store.release(claim, JobState.PAUSED)
     store.delete_job(claim.job.id)
+    store.purge_deleted()
     assert set(rows(database_url).values()) == {0}
 
 
@@ -147,6 +148,7 @@ def test_designs_that_other_jobs_walked_stay_known(store: Store) -> None:
     ended(store, replace(completed(0), keys=(None, KEYS[1])))
     assert set(store.known(KEYS)) == set(KEYS)
     store.delete_job(gone.id)
+    store.purge_deleted()
     assert set(store.known(KEYS)) == {KEYS[1]}
 
 

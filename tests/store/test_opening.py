@@ -99,7 +99,7 @@ def test_a_database_is_made_and_opened_without_alembic(tmp_path: Path) -> None:
 def test_a_database_of_a_newer_gaitswarm_is_left_alone(fresh_url: str) -> None:
     open_store(fresh_url).close()
     edit(fresh_url, "UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(StoreUnavailable, match=r"9999.*upgrade gaitswarm"):
+    with pytest.raises(StoreUnavailable, match=r"9999.*another version of gaitswarm"):
         open_store(fresh_url)
 
 

@@ -78,7 +78,7 @@ def test_a_database_of_a_version_before_the_first_release_is_refused(
 ) -> None:
     store_job(fresh_url)
     edit(fresh_url, "UPDATE alembic_version SET version_num = '0023'")
-    with pytest.raises(StoreUnavailable, match=r"0023 .* before 0\.1\.0.*name another database"):
+    with pytest.raises(StoreUnavailable, match=r"0023, .*does not know.*name another database"):
         opened(fresh_url)
     assert revision(fresh_url) == "0023"
 
@@ -112,7 +112,7 @@ def test_an_upgrade_makes_the_tables_of_an_empty_database(fresh_url: str) -> Non
 def test_no_upgrade_touches_what_a_newer_gaitswarm_has_made(fresh_url: str) -> None:
     open_store(fresh_url).close()
     edit(fresh_url, "UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(StoreUnavailable, match=f"9999.*up to {head()}.*upgrade gaitswarm"):
+    with pytest.raises(StoreUnavailable, match=f"9999.*to {head()}.*another version of gaitswarm"):
         upgrade(fresh_url)
 
 
@@ -127,10 +127,8 @@ def test_a_database_that_an_idle_process_has_open_is_not_upgraded(
     with process:
         assert output(process.stdout).readline() == "ready\n"
         release_next()
-        with pytest.raises(Conflict, match=r"in use by .*end all that use it first") as refused:
+        with pytest.raises(Conflict, match=r"in use by .*end all that use it first"):
             upgrade(fresh_url)
-        if fresh_url.startswith("postgresql"):
-            assert f":{process.pid}" in str(refused.value)
         output(process.stdin).write("end\n")
         output(process.stdin).flush()
         process.wait(timeout=30.0)
@@ -160,7 +158,7 @@ def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
         store.close()
         edit(fresh_url, "UPDATE alembic_version SET version_num = '9999'")
         for _ in range(2):
-            with pytest.raises(StoreUnavailable, match=f"9999.*up to {head()}"):
+            with pytest.raises(StoreUnavailable, match=f"9999.*to {head()}"):
                 store.create_job(spec())
 
 

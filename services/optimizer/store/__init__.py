@@ -11,7 +11,6 @@ from gaitswarm.services.optimizer.store.engine import (
     parse_url,
 )
 from gaitswarm.services.optimizer.store.history import History
-from gaitswarm.services.optimizer.store.job_list import JobList
 from gaitswarm.services.optimizer.store.jobs import Jobs
 from gaitswarm.services.optimizer.store.leases import Leases
 from gaitswarm.services.optimizer.store.outbox import Outbox
@@ -20,7 +19,7 @@ from gaitswarm.services.optimizer.store.schema import admit, check_revision, cre
 from gaitswarm.services.optimizer.store.tokens import Audit, Tokens
 
 
-class Store(Jobs, JobList, Leases, History, Recordings, Audit):
+class Store(Jobs, Leases, History, Recordings, Audit):
     """A database of jobs. Thread-safe.
 
     A method is one transaction, which happens wholly or not at all, unless it says that it uses

@@ -1,16 +1,34 @@
-"""Submission, commands, labels and deletion of jobs"""
+"""Submission, commands, labels, lists and deletion of jobs"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import time
-from collections.abc import Callable, Collection
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
-from sqlalchemy import Connection, Table, delete, exists, func, insert, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Double,
+    Select,
+    Table,
+    and_,
+    case,
+    delete,
+    exists,
+    false,
+    func,
+    insert,
+    literal,
+    select,
+    tuple_,
+    update,
+)
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import (
@@ -21,6 +39,7 @@ from gaitswarm.services.optimizer.errors import (
 )
 from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from gaitswarm.services.optimizer.jobs.documents import check_budget
+from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage
 from gaitswarm.services.optimizer.jobs.job import (
     DELETABLE,
@@ -28,18 +47,31 @@ from gaitswarm.services.optimizer.jobs.job import (
     Claim,
     Command,
     Job,
+    JobOrder,
     JobState,
     Quota,
     commanded,
     extended,
 )
 from gaitswarm.services.optimizer.jobs.labels import (
+    ANY_JOB,
+    OWN,
+    FacetCounts,
+    JobFilter,
     Labels,
     LabelsChange,
     preference_name,
     robot_name,
 )
-from gaitswarm.services.optimizer.jobs.listing import folded, storable
+from gaitswarm.services.optimizer.jobs.listing import (
+    Page,
+    Queue,
+    checked_limit,
+    folded,
+    from_cursor,
+    storable,
+    to_cursor,
+)
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -48,6 +80,7 @@ from gaitswarm.services.optimizer.store.history import take_history
 from gaitswarm.services.optimizer.store.job_rows import (
     COLUMNS,
     entering,
+    is_job_id,
     job_row,
     new_job_id,
     provenance_document,
@@ -64,15 +97,16 @@ from gaitswarm.services.optimizer.store.tables import (
     notifications,
 )
 from gaitswarm.services.optimizer.store.tokens import check_quota, note_change
+from gaitswarm.sim.robot.variant import SHIPPED
+
+_ERROR_LENGTH: Final = 300
 
 _LONGEST_KEY: Final = 200
 
 _EVALUATIONS_AT_ONCE: Final = 5000
 """Removed in one transaction."""
 
-_JOBS_AT_ONCE: Final = 500
 _STEADY: Final = timedelta(days=1)
-"""Marked as deleted in one transaction."""
 
 _DELETED: Final = select(jobs.c.id).where(jobs.c.deleted_at.is_not(None)).limit(1)
 
@@ -356,7 +390,7 @@ class Jobs(Aggregate):
         """Delete a job with its history; forks have copies of theirs.
 
         The job is invisible, and its idempotency key free, once this returns. `purge_deleted`
-        removes the rows of a long job, as SQLite has one writer at a time.
+        removes its rows.
 
         Raises:
             Conflict: it is queued, running, pausing or kept.
@@ -374,9 +408,7 @@ class Jobs(Aggregate):
                     "cannot delete a job that is kept; release it first: `gaitswarm keep --release"
                     f" {job_id}`, or DELETE /v1/jobs/{job_id}/keep"
                 )
-            _mark_deleted(connection, [job_id], self._clock(connection), actor)
-            if row["evaluations"] <= _EVALUATIONS_AT_ONCE:
-                _remove_rows(connection, job_id)
+            _mark_deleted(connection, [jobs.c.id == job_id], self._clock(connection), actor)
 
     def clock_jump(self) -> timedelta | None:
         """Return by how much the clock has jumped ahead in the last day; None if it has not.
@@ -412,22 +444,15 @@ class Jobs(Aggregate):
         unfinished_fork = exists().where(
             fork.c.parent_id == jobs.c.id, fork.c.state.not_in(ENDED), fork.c.deleted_at.is_(None)
         )
-        expired = select(jobs.c.id).where(
+        expired = (
             jobs.c.state.in_(ENDED.intersection(states)),
             jobs.c.finished_at < moment,
             jobs.c.kept.is_(False),
             EXISTING,
             ~unfinished_fork,
         )
-        deleted: list[str] = []
-        while True:
-            with self._database.write("delete_ended_before") as connection:
-                query = expired.limit(_JOBS_AT_ONCE).with_for_update()
-                ids = list(connection.execute(query).scalars())
-                _mark_deleted(connection, ids, self._clock(connection), RETENTION)
-            deleted += ids
-            if len(ids) < _JOBS_AT_ONCE:
-                return tuple(deleted)
+        with self._database.write("delete_ended_before") as connection:
+            return _mark_deleted(connection, expired, self._clock(connection), RETENTION)
 
     def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
         """Remove rows of deleted jobs in short transactions, using half of the time.
@@ -445,6 +470,94 @@ class Jobs(Aggregate):
                 more = _remove_rows(connection)
             if more:
                 time.sleep(time.monotonic() - begun)
+
+    def jobs(
+        self,
+        *,
+        state: JobState | None = None,
+        kind: str | None = None,
+        parent: str | None = None,
+        search: str = "",
+        where: JobFilter = ANY_JOB,
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
+        reverse: bool = False,
+    ) -> Page[Job]:
+        """Return a page of jobs. Jobs submitted meanwhile do not shift later pages.
+
+        Args:
+            state: only jobs in this state.
+            kind: only jobs of this kind.
+            parent: only forks of the job of this id.
+            where: further criteria.
+            order: sort order; jobs without a value are last, also in the reverse order.
+            reverse: whether to reverse the order.
+
+        Raises:
+            InvalidRequest: the cursor is invalid or of another order, or the limit less than 1.
+        """
+        limit = checked_limit(limit)
+        cursor = f"-{order}" if reverse else str(order)
+        kinds: dict[JobOrder, type] = {JobOrder.CREATED: datetime, JobOrder.NAME: str}
+        last = None if after is None else from_cursor(cursor, after, kinds.get(order, float))
+        conditions = _conditions(where)
+        if state is not None:
+            conditions.append(jobs.c.state == state)
+        if parent is not None:
+            conditions.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
+        if search:
+            conditions.append(jobs.c.search_text.contains(folded(search), autoescape=True))
+        if kind is not None:
+            conditions.append(jobs.c.kind == kind)
+        with self._database.read("jobs") as connection:
+            key = _key(connection, order)
+            rows = list[Any]()
+            descending = reverse is not (order is JobOrder.CREATED)
+            for ids, place in _pages(conditions, key, last, descending):
+                # Only ids are sorted and filtered: specs may be large.
+                page = ids.limit(limit + 1 - len(rows))
+                shown = select(*COLUMNS, key.label("sort_key")).where(jobs.c.id.in_(page))
+                rows += connection.execute(shown.order_by(*place)).mappings()
+                if len(rows) > limit:
+                    break
+        items = tuple(map(to_job, rows[:limit]))
+        if len(rows) <= limit:
+            return Page(items, None)
+        return Page(items, to_cursor(cursor, rows[limit - 1]["sort_key"], items[-1].id))
+
+    def facets(self, *, archived: bool | None = None) -> FacetCounts:
+        """Count jobs by facet."""
+        names = ("state", "robot", "controller", "preference")
+        query = select(*(jobs.c[name] for name in names), jobs.c.tags)
+        with self._database.read("facets") as connection:
+            rows = connection.execute(query.where(*_conditions(JobFilter(archived=archived)))).all()
+        states, robots, controllers, preferences = (
+            Counter(v for row in rows if (v := row[k]) is not None) for k in range(4)
+        )
+        tags = Counter(tag for row in rows for tag in (row.tags or "").split("\n")[1:-1])
+        return FacetCounts(len(rows), states, robots, controllers, preferences, tags)
+
+    def queue(self) -> Queue:
+        """Count jobs by state and kind. Ended jobs are not read, as there may be very many."""
+        with self._database.read("queue") as connection:
+            now = self._clock(connection)
+            numbers = select(jobs.c.state, func.count()).where(EXISTING).group_by(jobs.c.state)
+            by_state = dict.fromkeys(JobState, 0)
+            by_state |= {JobState(state): count for state, count in connection.execute(numbers)}
+            state_and_kind = (jobs.c.state, jobs.c.kind)
+            unfinished = select(*state_and_kind, func.count()).group_by(*state_and_kind)
+            query = unfinished.where(jobs.c.state.not_in(ENDED), EXISTING)
+            under_way = {
+                (JobState(state), kind): count for state, kind, count in connection.execute(query)
+            }
+            queued = (jobs.c.state == JobState.QUEUED, EXISTING)
+            since = connection.execute(select(func.min(jobs.c.updated_at)).where(*queued)).scalar()
+            beginning = func.substr(func.coalesce(jobs.c.error, ""), 1, _ERROR_LENGTH)
+            failed = select(beginning).where(jobs.c.state == JobState.FAILED, EXISTING)
+            errors = tuple(connection.execute(failed).scalars())
+        wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
+        return Queue(by_state, under_way, wait, errors)
 
 
 def _repeated_job(
@@ -476,35 +589,110 @@ def _search_columns(job_id: str, spec_name: str, labels: Labels) -> dict[str, An
     return columns | {"tags": storable(tags) if labels.tags else None}
 
 
-def _mark_deleted(connection: Connection, ids: Collection[str], now: datetime, actor: str) -> None:
+def _mark_deleted(
+    connection: Connection, which: Sequence[ColumnElement[bool]], now: datetime, actor: str
+) -> tuple[str, ...]:
     gone = {"deleted_at": now, "idempotency_key": None, "request_digest": None}
-    connection.execute(update(jobs).where(jobs.c.id.in_(ids)).values(**gone))
+    marked = update(jobs).where(*which).values(**gone).returning(jobs.c.id)
+    ids = tuple(connection.execute(marked).scalars())
     for job_id in ids:
         note_change(connection, now, actor, AuditAction.DELETE, job_id)
+    return ids
 
 
-def _remove_rows(connection: Connection, job_id: str | None = None) -> bool:
-    """Remove some rows of a deleted job, of any if None, and with the last its own.
-
-    Returns whether there may be more.
-    """
-    query = _DELETED if job_id is None else _DELETED.where(jobs.c.id == job_id)
-    job_id = connection.execute(query.with_for_update(skip_locked=True)).scalar()
+def _remove_rows(connection: Connection) -> bool:
+    """Remove some iterations of a deleted job, or its last rows. Returns whether there was one."""
+    job_id = connection.execute(_DELETED.with_for_update(skip_locked=True)).scalar()
     if job_id is None:
         return False
-    table = evaluations.c
-    places = select(table.iteration).where(table.job_id == job_id)
-    places = places.order_by(table.iteration, table.particle)
-    end = connection.execute(places.offset(_EVALUATIONS_AT_ONCE).limit(1)).scalar()
-    if end is not None:
-        # At least one iteration.
-        end = max(end, connection.execute(places.limit(1)).scalar_one() + 1)
-    for of_job in _OF_JOBS:
-        rows = delete(of_job).where(of_job.c.job_id == job_id)
-        if end is None:
+    place, of_job = evaluations.c.iteration, evaluations.c.job_id == job_id
+    first = connection.execute(select(func.min(place)).where(of_job)).scalar()
+    if first is not None:
+        count = select(func.count()).where(of_job, place == first)
+        end = first + max(1, _EVALUATIONS_AT_ONCE // connection.execute(count).scalar_one())
+    for table in _OF_JOBS:
+        rows = delete(table).where(table.c.job_id == job_id)
+        if first is None:
             connection.execute(rows)
-        elif "iteration" in of_job.c:
-            connection.execute(rows.where(of_job.c.iteration < end))
-    if end is None:
+        elif "iteration" in table.c:
+            connection.execute(rows.where(table.c.iteration < end))
+    if first is None:
         connection.execute(delete(jobs).where(jobs.c.id == job_id))
     return True
+
+
+def _conditions(where: JobFilter) -> list[ColumnElement[bool]]:
+    conditions: list[ColumnElement[bool]] = [EXISTING]
+    if where.archived is not None:
+        conditions.append(jobs.c.archived.is_(where.archived))
+    if where.robot == OWN:
+        conditions.append(jobs.c.robot.not_in(SHIPPED))
+    elif where.robot is not None:
+        conditions.append(jobs.c.robot == storable(where.robot))
+    if where.controller is not None:
+        conditions.append(jobs.c.controller == storable(where.controller))
+    if where.preference is not None:
+        conditions.append(jobs.c.preference == storable(where.preference))
+    if where.tag is not None:
+        # Unlike LIKE, this tells capital letters apart in both databases.
+        without = func.replace(jobs.c.tags, f"\n{storable(where.tag)}\n", "")
+        conditions.append(without != jobs.c.tags)
+    return conditions
+
+
+def _pages(
+    conditions: list[ColumnElement[bool]],
+    key: ColumnElement[Any],
+    last: tuple[Any, str] | None,
+    descending: bool,
+) -> Iterator[tuple[Select[Any], list[ColumnElement[Any]]]]:
+    """Yield ids after the last job and their order: jobs with a sort value, then the others."""
+    ids = select(jobs.c.id).where(*conditions)
+    if last is None or last[0] is not None:
+        place = [key, jobs.c.id]
+        valued = ids.where(key.is_not(None))
+        if last is not None:
+            value = literal(last[0], Double if isinstance(last[0], float) else None)
+            end, here = tuple_(value, literal(last[1])), tuple_(*place)
+            valued = valued.where(here < end if descending else here > end)
+        order = [column.desc() if descending else column for column in place]
+        yield valued.order_by(*order), order
+    if key is not jobs.c.created_at:
+        unvalued = ids.where(key.is_(None)).order_by(jobs.c.id)
+        if last is not None and last[0] is None:
+            unvalued = unvalued.where(jobs.c.id > last[1])
+        yield unvalued, [jobs.c.id]
+
+
+def _key(connection: Connection, order: JobOrder) -> ColumnElement[Any]:
+    """Return the value to sort by; NULL if a job has none."""
+    if order is JobOrder.TIME_LEFT:
+        return _time_left(connection)
+    if order is JobOrder.GAIN:
+        # The negative of `Job.gain`.
+        reference = jobs.c.reference_fitness
+        return jobs.c.best_fitness / case((reference > 0.0, reference)) - 1.0
+    if order is JobOrder.RATE:
+        own, seconds = jobs.c.evaluations - jobs.c.evaluations_taken, jobs.c.compute_seconds
+        return -case((and_(own > 0, seconds > 0.0), own / case((seconds > 0.0, seconds))))
+    if order is JobOrder.STATE:
+        return case({str(state): k for k, state in enumerate(JobState)}, value=jobs.c.state)
+    keys: dict[JobOrder, ColumnElement[Any]] = {
+        JobOrder.CREATED: jobs.c.created_at,
+        JobOrder.FITNESS: jobs.c.best_fitness,
+        JobOrder.NAME: jobs.c.sort_name,
+        JobOrder.EVALUATIONS: -jobs.c.evaluations,
+        JobOrder.PRIORITY: -jobs.c.priority,
+        JobOrder.ITERATIONS: -jobs.c.iterations,
+    }
+    return keys[order]
+
+
+def _time_left(connection: Connection) -> ColumnElement[Any]:
+    """Return the estimates of the few running jobs; they depend on the time."""
+    running = select(*COLUMNS).where(EXISTING, jobs.c.state == JobState.RUNNING)
+    now = datetime.now(UTC)
+    shown = map(to_job, connection.execute(running).mappings())
+    times = {job.id: time_left(job, now).eta_seconds for job in shown}
+    known = {job_id: literal(s, Double) for job_id, s in times.items() if s is not None}
+    return case(known, value=jobs.c.id) if known else func.nullif(literal(0.0, Double), 0.0)

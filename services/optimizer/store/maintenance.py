@@ -11,22 +11,18 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from sqlalchemy import (
     JSON,
     URL,
     Connection,
-    Select,
-    Table,
     Text,
     bindparam,
     cast,
     delete,
-    exists,
     func,
     insert,
-    or_,
     select,
 )
 
@@ -46,9 +42,6 @@ from gaitswarm.services.optimizer.store.schema import (
     upgrade,
 )
 from gaitswarm.services.optimizer.store.tables import (
-    EXISTING,
-    evaluations,
-    iterations,
     jobs,
     metadata,
     recordings,
@@ -66,20 +59,20 @@ _RECORDING_ID: Final = re.compile(r"\b[0-9a-f]{32}\b")
 
 
 def backup(url: str, file: Path, *, overwrite: bool = False) -> None:
-    """Write a snapshot of a database, which may be in use, to an SQLite file.
+    """Write a snapshot of an SQLite database, which may be in use, to a file.
 
     Raises:
+        InvalidRequest: the database is on a server.
         Conflict: the file exists and must not be replaced.
         StoreUnavailable: the database cannot be read, or the file not be written.
     """
     if file.exists() and not overwrite:
         raise Conflict(f"{file} exists already; name another file, or replace it with --force")
     parsed = parse_url(url)
+    if parsed.get_backend_name() != "sqlite":
+        raise InvalidRequest("back up PostgreSQL with its own pg_dump --format custom", field="db")
     with _temporary_file(file.parent, f"backup {file}") as copy:
-        if parsed.get_backend_name() == "sqlite":
-            _copy_file(Path(str(parsed.database)), copy)
-        else:
-            _copy_server(parsed, copy)
+        _copy_file(Path(str(parsed.database)), copy)
         copy.replace(file)
 
 
@@ -131,32 +124,11 @@ def _copy_file(source: Path, target: Path) -> None:
     uri = f"{source.absolute().as_uri()}?mode={mode}"
     with closing(sqlite3.connect(uri, uri=True)) as from_, closing(sqlite3.connect(target)) as to:
         from_.backup(to)
-        _finish_copy(to)
-
-
-def _finish_copy(connection: sqlite3.Connection) -> None:
-    """Leave the write-ahead log, so that the file is complete, and read it once."""
-    connection.execute("PRAGMA journal_mode = DELETE")
-    (result,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+        # Leave the write-ahead log, so that the file is complete, and read it once.
+        to.execute("PRAGMA journal_mode = DELETE")
+        (result,) = to.execute("PRAGMA quick_check(1)").fetchone()
     if result != "ok":
         raise StoreUnavailable(f"the database is damaged, and its copy with it: {result}")
-
-
-def _copy_server(url: URL, target: Path) -> None:
-    create(parse_url(str(target)))
-
-    def snapshot(connection: Connection) -> None:
-        connection.execution_options(isolation_level="REPEATABLE READ")
-
-    with (
-        closing(Database(url, for_migration=True)) as source,
-        closing(Database(str(target), for_migration=True)) as copy,
-    ):
-        check_revision(source)
-        with source.transaction(write=False, before=snapshot) as rows, copy.write() as to:
-            _copy_rows(rows, to)
-    with closing(sqlite3.connect(target)) as connection:
-        _finish_copy(connection)
 
 
 def _fill_server(url: URL, copy: Path, *, overwrite: bool) -> None:
@@ -211,23 +183,19 @@ def _copy_rows(source: Connection, target: Connection) -> None:
         rows = source.execute(select(table), execution_options=options).mappings()
         for batch in rows.partitions():
             target.execute(statement, [dict(row) for row in batch])
-        _advance_sequence(target, table)
-
-
-def _advance_sequence(connection: Connection, table: Table) -> None:
-    """Continue a server's numbering after the copied rows."""
-    column = table.autoincrement_column
-    if column is None or connection.dialect.name != "postgresql":
-        return
-    sequence = func.pg_get_serial_sequence(table.name, column.name)
-    last = func.coalesce(func.max(column), 0)
-    connection.execute(select(func.setval(sequence, last + 1, False)).select_from(table))
+        column = table.autoincrement_column
+        if column is not None:
+            # Numbering continues after the copied rows.
+            sequence = func.pg_get_serial_sequence(table.name, column.name)
+            last = func.coalesce(func.max(column), 0)
+            target.execute(select(func.setval(sequence, last + 1, False)).select_from(table))
 
 
 def check(url: str) -> list[str]:
-    """Return contradictions in a database, which may be in use; at most 20 of each kind.
+    """Return damage of an SQLite file, which may be in use; at most 20 findings of each kind.
 
-    Raises StoreUnavailable if it cannot be read or lacks the newest schema.
+    A server checks its own files. Raises StoreUnavailable if the database cannot be read or lacks
+    the newest schema.
     """
     findings: list[str] = []
     with closing(Database(url, for_migration=True)) as database:
@@ -241,56 +209,7 @@ def check(url: str) -> list[str]:
                     f"row {row} of {table} refers to a row of {parent} that is not there"
                     for table, row, parent, _ in orphans.fetchmany(_MOST_FINDINGS)
                 ]
-            for query, message in _contradictions():
-                rows = connection.execute(query.limit(_MOST_FINDINGS))
-                findings += [message.format(*row) for row in rows]
     return findings
-
-
-def _contradictions() -> Iterator[tuple[Select[Any], str]]:
-    count, last = func.count(iterations.c.iteration), func.max(iterations.c.iteration)
-    committed = (iterations.c.job_id == jobs.c.id) & iterations.c.committed_at.is_not(None)
-    yield (
-        select(jobs.c.id, jobs.c.iterations, count)
-        .select_from(jobs.outerjoin(iterations, committed))
-        .where(EXISTING)
-        .group_by(jobs.c.id, jobs.c.iterations)
-        .having(or_(count != jobs.c.iterations, func.coalesce(last, -1) != jobs.c.iterations - 1)),
-        "job {} counts {} iterations, but has {} that are committed",
-    )
-    count = func.count(evaluations.c.particle)
-    yield (
-        select(jobs.c.id, jobs.c.evaluations, count)
-        .select_from(jobs.outerjoin(evaluations, evaluations.c.job_id == jobs.c.id))
-        .where(EXISTING)
-        .group_by(jobs.c.id, jobs.c.evaluations)
-        .having(count != jobs.c.evaluations),
-        "job {} counts {} evaluations, but has {}",
-    )
-    evaluated = exists().where(
-        evaluations.c.job_id == iterations.c.job_id,
-        evaluations.c.iteration == iterations.c.iteration,
-    )
-    # Rows of deleted jobs are removed piece by piece.
-    existing = iterations.c.job_id.in_(select(jobs.c.id).where(EXISTING))
-    iteration = select(iterations.c.iteration, iterations.c.job_id).where(existing)
-    yield (
-        iteration.where(iterations.c.committed_at.is_not(None), ~evaluated),
-        "iteration {} of job {} is committed without evaluations",
-    )
-    yield (
-        iteration.where(iterations.c.committed_at.is_(None), evaluated),
-        "iteration {} of job {} has evaluations, but is not committed",
-    )
-    best = exists().where(
-        evaluations.c.job_id == jobs.c.id,
-        evaluations.c.iteration == jobs.c.best_iteration,
-        evaluations.c.particle == jobs.c.best_particle,
-    )
-    yield (
-        select(jobs.c.id).where(jobs.c.best_iteration.is_not(None), ~best, EXISTING),
-        "the best design of job {} is not among its evaluations",
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,18 +85,12 @@ def _require_newest(revision: str | None, name: str) -> None:
 
 def _require_known(revision: str, name: str) -> None:
     known = _known_revisions()
-    if revision in known:
-        return
-    if revision < known[0]:
+    if revision not in known:
         raise StoreUnavailable(
-            f"database {name} has schema revision {revision} of a version before 0.1.0, which this"
-            f" gaitswarm cannot read; name another database, or run `gaitswarm db upgrade` of a"
-            f" version whose schema revision is {known[0]} first"
+            f"database {name} has schema revision {revision}, which this gaitswarm ({known[0]} to"
+            f" {known[-1]}) does not know; use another version of gaitswarm, or name another"
+            " database"
         )
-    raise StoreUnavailable(
-        f"database {name} has schema revision {revision}, which this gaitswarm (up to {known[-1]})"
-        " does not know; upgrade gaitswarm, or name another database"
-    )
 
 
 def create(url: sa.URL) -> None:
@@ -107,7 +101,9 @@ def create(url: sa.URL) -> None:
     """
     with closing(Database(url, for_migration=True)) as database:
         if database.path is not None:
-            _create_file(database.path)
+            # Only this user can read it, and SQLite's log. SQLite says why it cannot be made.
+            with suppress(OSError):
+                os.close(os.open(database.path, os.O_CREAT | os.O_RDWR, 0o600))
         # An existing database needs no write lock.
         with database.read() as connection:
             revision = read_revision(connection)
@@ -127,13 +123,6 @@ def create(url: sa.URL) -> None:
                 metadata.create_all(connection, checkfirst=False)
                 _alembic_version.create(connection)
                 connection.execute(_alembic_version.insert().values(version_num=head()))
-
-
-def _create_file(path: Path) -> None:
-    """Create an SQLite file that only this user can read, unless there is one."""
-    # SQLite gives its log the same permissions. It says why a file cannot be created.
-    with suppress(OSError):
-        os.close(os.open(path, os.O_CREAT | os.O_RDWR, 0o600))
 
 
 def upgrade(url: str) -> str | None:
@@ -160,7 +149,7 @@ def upgrade(url: str) -> str | None:
 
 
 def lock_for_migration(connection: sa.Connection) -> None:
-    """Migrate in one process at a time; on SQLite the write transaction is lock enough."""
+    """Create in one process at a time; on SQLite the write transaction is lock enough."""
     if connection.dialect.name == "postgresql":
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_MIGRATING})")
 
@@ -200,10 +189,17 @@ def exclusive(database: Database) -> Iterator[sa.Connection]:
 
     Raises Conflict if it is in use: another process has it open, or a job has a live lease.
     """
-    prepare = None if database.path is None else _lock_file
-    with database.transaction(write=True, before=prepare) as connection:
+
+    def lock_before(connection: sa.Connection) -> None:
+        if database.path is not None:
+            with closing(connection.connection.cursor()) as cursor:
+                lock_file(cursor, database.name)
+
+    with database.transaction(write=True, before=lock_before) as connection:
         if database.path is None:
-            _lock_server(connection, database.name)
+            locked = sa.select(sa.func.pg_try_advisory_xact_lock(_IN_USE))
+            if not connection.execute(locked).scalar_one():
+                raise _in_use(database.name)
         if sa.inspect(connection).has_table("jobs"):
             # A runner may be cut off from the server.
             columns = (jobs.c.id, jobs.c.lease_owner)
@@ -218,11 +214,6 @@ def exclusive(database: Database) -> Iterator[sa.Connection]:
         yield connection
 
 
-def _lock_file(connection: sa.Connection) -> None:
-    with closing(connection.connection.cursor()) as cursor:
-        lock_file(cursor, str(connection.engine.url.database))
-
-
 def lock_file(cursor: Any, name: str) -> None:
     """Lock an SQLite file by leaving its write-ahead log, which needs exclusive use.
 
@@ -233,25 +224,11 @@ def lock_file(cursor: Any, name: str) -> None:
     try:
         cursor.execute("PRAGMA journal_mode = DELETE")
     except sqlite3.OperationalError as error:
-        raise Conflict(
-            f"database {name} is in use by another process: end all that use it first"
-        ) from error
+        raise _in_use(name) from error
 
 
-def _lock_server(connection: sa.Connection, name: str) -> None:
-    locked = sa.text("SELECT pg_try_advisory_xact_lock(:key)")
-    if connection.execute(locked, {"key": _IN_USE}).scalar_one():
-        return
-    query = sa.text(
-        "SELECT DISTINCT coalesce(nullif(application_name, ''), 'process ' || pid)"
-        " FROM pg_locks JOIN pg_stat_activity USING (pid)"
-        " WHERE locktype = 'advisory' AND objid = :low AND granted AND pid <> pg_backend_pid()"
-        " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-    )
-    holders = connection.execute(query, {"low": _IN_USE & 0xFFFF_FFFF}).scalars()
-    raise Conflict(
-        f"database {name} is in use by {', '.join(sorted(holders))}: end all that use it first"
-    )
+def _in_use(name: str) -> Conflict:
+    return Conflict(f"database {name} is in use by another process: end all that use it first")
 
 
 def admit(database: Database) -> None:

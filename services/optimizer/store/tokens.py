@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from datetime import datetime
-from itertools import takewhile
 from typing import Any, Final
 
 from sqlalchemy import Connection, delete, func, insert, select, update
@@ -19,9 +18,6 @@ from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.tables import Row, audit, jobs, tokens
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
-
-_AT_ONCE: Final = 5000
-"""Audit entries removed in one transaction."""
 
 
 class Tokens(Aggregate):
@@ -153,22 +149,9 @@ class Audit(Aggregate):
         return Page(entries, str(entries[-1].index) if len(rows) > limit else None)
 
     def forget_audit_before(self, moment: datetime) -> int:
-        """Remove the oldest entries, in short transactions, and return their number.
-
-        Args:
-            moment: entries from before this aware time are removed.
-        """
-        removed = 0
-        while True:
-            with self._database.write("forget_audit_before") as connection:
-                oldest = select(audit.c.id, audit.c.at).order_by(audit.c.id).limit(_AT_ONCE)
-                old = takewhile(lambda row: row.at < moment, connection.execute(oldest))
-                ids = [row.id for row in old]
-                if ids:
-                    connection.execute(delete(audit).where(audit.c.id <= ids[-1]))
-            removed += len(ids)
-            if len(ids) < _AT_ONCE:
-                return removed
+        """Remove entries from before an aware time, and return their number."""
+        with self._database.write("forget_audit_before") as connection:
+            return connection.execute(delete(audit).where(audit.c.at < moment)).rowcount
 
 
 def note_change(

@@ -114,9 +114,8 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     copy: Path, proved: Proved
 ) -> None:
     """A writer of the database can recompute the chain, but cannot forge simulations."""
-    from gaitswarm.services.optimizer.store.engine import Database
-    from gaitswarm.services.optimizer.store.history import chain_iterations
-    from gaitswarm.services.optimizer.store.job_rows import chain_documents, job_row
+    from gaitswarm.services.optimizer.jobs.chain import iteration_digest
+    from gaitswarm.services.optimizer.store import open_store
 
     with closing(sqlite3.connect(copy)) as connection:
         (text,) = connection.execute(
@@ -131,11 +130,16 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
         )
         connection.commit()
     noted = digests(copy, proved.id)[-1]
-    database = Database(str(copy))
-    with database.write() as transaction:
-        documents = chain_documents(job_row(transaction, proved.id))
-        head = chain_iterations(transaction, proved.id, documents, 3)
-    database.close()
+    with closing(open_store(str(copy))) as store:
+        documents = store.chain_documents(proved.id)
+        columns = store.evaluation_columns(proved.id, 0, 3)
+        links = store.links(proved.id, 0, 3)
+    assert columns is not None
+    head = documents.digest
+    for link in links:
+        rows = columns.of_iteration(link.iteration)
+        head = iteration_digest(head, documents, link, rows, None)
+        execute(copy, f"UPDATE iterations SET digest = '{head}' WHERE iteration = {link.iteration}")  # noqa: S608
     execute(copy, f"UPDATE jobs SET head = '{head}'")  # noqa: S608
 
     assert verified(copy, proved.id).verified

@@ -7,9 +7,9 @@ of +inf is NULL.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from datetime import datetime
 from functools import cache
 from itertools import pairwise
@@ -23,12 +23,10 @@ from sqlalchemy import (
     Connection,
     Table,
     Text,
-    bindparam,
     cast,
     delete,
     func,
     insert,
-    literal,
     select,
     update,
 )
@@ -51,7 +49,6 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     Iteration,
     JournalEntry,
     Reevaluation,
-    best_particle,
     evaluations_of,
     fitness_summary,
 )
@@ -76,6 +73,9 @@ from gaitswarm.services.optimizer.store.tables import (
 from gaitswarm.sim.outcome import Outcome, Status
 
 _LARGEST_INDEX: Final = 2**31 - 1
+
+_REEVALUATION: Final = tuple(field.name for field in fields(Reevaluation))
+"""Columns that are fields of `Reevaluation`."""
 
 _KEYS_AT_ONCE: Final = 1000
 _TEXTS_AT_ONCE: Final = 200
@@ -305,21 +305,6 @@ def _select_links(connection: Connection, job_id: str, first: int, last: int) ->
     )
 
 
-def _result_columns(
-    objectives: Iterable[Iterable[float]], statuses: Iterable[int], fitness: float
-) -> dict[str, Any]:
-    return {
-        "objectives": [[_number(value) for value in case] for case in objectives],
-        "statuses": [Status(status).label for status in statuses],
-        "fitness": _number(fitness),
-    }
-
-
-def _number(value: float | np.floating[Any]) -> float | None:
-    """Return None for a value that JSON and SQL cannot hold."""
-    return float(value) if math.isfinite(value) else None
-
-
 def open_ask(connection: Connection, job: Row) -> Ask | None:
     """Return the ask that is not committed yet; None before the first or after the last."""
     return _ask(connection, job["id"], job["iterations"])
@@ -346,7 +331,15 @@ def _at(job_id: str, iteration: int) -> ColumnElement[bool]:
     return (iterations.c.job_id == job_id) & (iterations.c.iteration == iteration)
 
 
-def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:
+def insert_ask(
+    connection: Connection,
+    job: Row,
+    ask: Ask,
+    *,
+    expected: int,
+    now: datetime,
+    digest: str | None = None,
+) -> None:
     """Store an ask before it is evaluated. Raises Conflict for another than the next iteration."""
     if ask.iteration != expected:
         raise Conflict(
@@ -358,7 +351,7 @@ def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now
             iteration=ask.iteration,
             positions=ask.positions.tolist(),
             optimizer_state=ask.state,
-            ask_digest=ask_digest(ask.positions, ask.state),
+            ask_digest=digest or ask_digest(ask.positions, ask.state),
             asked_at=now,
         )
     )
@@ -366,11 +359,14 @@ def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now
 
 def complete_iteration(
     connection: Connection, job: Row, done: CompletedIteration, now: datetime
-) -> str:
-    """Store the results of the open ask, and return their digest. Raises Conflict if not asked.
+) -> dict[str, Any]:
+    """Store the results of the open ask. Raises Conflict if not asked.
 
     Clears the optimizer's state of the iteration before: a job continues from its open ask or, if
     extended, from its last committed one, and states may grow with every iteration.
+
+    Returns:
+        Changed columns of the job's row.
     """
     asked = select(iterations.c.positions, iterations.c.ask_digest)
     open_iteration = _at(job["id"], done.iteration) & iterations.c.committed_at.is_(None)
@@ -380,12 +376,24 @@ def complete_iteration(
             f"iteration {done.iteration} of job {job['id']} was not asked; its next is"
             f" {job['iterations']}"
         )
-    documents = chain_documents(job)
     link = Link(done.iteration, np.array(row.positions, dtype=np.float64), row.ask_digest)
-    before = job["head"] or documents.digest
+    previous = _at(job["id"], done.iteration - 1)
+    connection.execute(update(iterations).where(previous).values(optimizer_state={}))
+    return _insert_results(connection, job, chain_documents(job), link, done, now)
+
+
+def _insert_results(
+    connection: Connection,
+    job: Row,
+    documents: ChainDocuments,
+    link: Link,
+    done: CompletedIteration,
+    now: datetime,
+) -> dict[str, Any]:
     columns = done.columns
+    before = job["head"] or documents.digest
     digest = iteration_digest(before, documents, link, columns, done.reevaluation)
-    best = None if done.best is None else done.best[1]
+    particle, best = done.best or (None, None)
     connection.execute(
         update(iterations)
         .where(_at(job["id"], done.iteration))
@@ -396,33 +404,40 @@ def complete_iteration(
             **fitness_summary(done.fitness, best, job["best_fitness"]),
         )
     )
-    previous = _at(job["id"], done.iteration - 1)
-    connection.execute(update(iterations).where(previous).values(optimizer_state={}))
     keys = done.keys or [None] * len(columns)
-    connection.execute(insert(evaluations), _evaluation_rows(job["id"], columns, keys))
-    if done.reevaluation is not None:
-        again = done.reevaluation
-        results = _result_columns(again.objectives.tolist(), again.statuses.tolist(), again.fitness)
-        place = {"job_id": job["id"], "iteration": done.iteration, "particle": again.particle}
-        connection.execute(insert(reevaluations).values(**place, **results))
-    return digest
-
-
-def _evaluation_rows(
-    job_id: str, columns: EvaluationColumns, keys: Sequence[bytes | None]
-) -> list[dict[str, Any]]:
     rows: Any = zip(*(array.tolist() for array in columns.arrays), keys, strict=True)
-    return [
-        {
-            "job_id": job_id,
-            "iteration": iteration,
-            "particle": particle,
-            "design": design,
-            "walk_key": key,
-            **_result_columns(objectives, statuses, fitness),
-        }
-        for iteration, particle, design, objectives, statuses, fitness, key in rows
-    ]
+    names = ("iteration", "particle", "design", "objectives", "statuses", "fitness", "walk_key")
+    values = [dict(zip(names, row, strict=True)) for row in rows]
+    connection.execute(insert(evaluations), [_result(job["id"], row) for row in values])
+    if done.reevaluation is not None:
+        again = {name: getattr(done.reevaluation, name) for name in _REEVALUATION}
+        row = _result(job["id"], again | {"iteration": done.iteration})
+        connection.execute(insert(reevaluations).values(**row))
+    changes = {
+        "head": digest,
+        "iterations": done.iteration + 1,
+        "evaluations": job["evaluations"] + len(columns),
+    }
+    if best is not None and (job["best_fitness"] is None or best < job["best_fitness"]):
+        changes |= {"best_fitness": best, "best_iteration": done.iteration}
+        changes |= {"best_particle": particle}
+    return changes
+
+
+def _result(job_id: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row of results; what JSON and SQL cannot hold is null."""
+    objectives = [[_number(value) for value in case] for case in values["objectives"]]
+    return {
+        **values,
+        "job_id": job_id,
+        "objectives": objectives,
+        "statuses": [Status(status).label for status in values["statuses"]],
+        "fitness": _number(values["fitness"]),
+    }
+
+
+def _number(value: float | np.floating[Any]) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def insert_entries(connection: Connection, job: Row, entries: Sequence[JournalEntry]) -> None:
@@ -464,112 +479,44 @@ def _journal_entry(row: Row) -> JournalEntry:
 def take_history(
     connection: Connection, job: Row, lineage: Lineage, taken: TakenHistory, now: datetime
 ) -> dict[str, Any]:
-    """Copy the parent's iterations to a fork, which then no longer depends on the parent.
+    """Commit the parent's iterations to a fork, which then no longer depends on the parent.
 
     Returns columns of the fork's row. Raises Conflict if the parent is gone.
     """
-    job_id, end = job["id"], lineage.from_iteration
-    committed = {"optimizer_state": {}, "asked_at": now, "committed_at": now}
-    copied = _copy(connection, iterations, job_id, lineage, committed | {"evaluate_seconds": 0.0})
-    if copied != end:
-        raise Conflict(
-            f"job {lineage.parent} has not the {end} iterations any more that were to be forked"
-        )
-    count = _copy(connection, evaluations, job_id, lineage, {"walk_key": None})
-    _copy(connection, reevaluations, job_id, lineage, {})
-    last = _at(job_id, end - 1)
-    positions = connection.execute(select(iterations.c.positions).where(last)).scalar_one()
-    digest = ask_digest(np.array(positions, dtype=np.float64), taken.state)
-    state = {"optimizer_state": taken.state, "ask_digest": digest}
-    connection.execute(update(iterations).where(last).values(**state))
-    if taken.fitness is not None:
-        _rejudge(connection, job_id, taken.fitness)
+    parent, end, precision = lineage.parent, lineage.from_iteration, to_job(job).spec.precision
     provenance = provenance_document(taken.provenance)
     documents = ChainDocuments(parsed(job["spec"]), parsed(job["lineage"]), provenance)
-    return {
-        "iterations": end,
-        "evaluations": count,
-        "evaluations_saved": count,
+    changes: dict[str, Any] = {
         "provenance": provenance,
-        "head": chain_iterations(connection, job_id, documents, end),
         "accepts_changes": taken.accepts_changes,
-        **_best_columns(connection, job_id, to_job(job).spec.precision),
     }
-
-
-def _copy(
-    connection: Connection, table: Table, job_id: str, lineage: Lineage, values: Mapping[str, Any]
-) -> int:
-    """Copy rows of the parent, some columns with other values, and return their number."""
-    given = {"job_id": job_id, **values}
-    columns = [literal(given[c.name], c.type) if c.name in given else c for c in table.c]
-    rows = select(*columns).where(*_between(table, lineage.parent, 0, lineage.from_iteration))
-    if table is iterations:
-        rows = rows.where(table.c.committed_at.is_not(None))
-    copied = insert(table).from_select([column.name for column in table.c], rows)
-    # Drivers know the number only while the cursor is open.
-    return connection.execute(copied.execution_options(preserve_rowcount=True)).rowcount
-
-
-def _rejudge(connection: Connection, job_id: str, fitness: Sequence[NDArray[np.float64]]) -> None:
-    """Replace the fitness of copied evaluations, and the summaries of their iterations."""
-    table = evaluations.c
-    judged = (
-        update(evaluations)
-        .where(
-            table.job_id == job_id,
-            table.iteration == bindparam("at"),
-            table.particle == bindparam("of"),
-        )
-        .values(fitness=bindparam("value"))
-    )
-    best_so_far: float | None = None
-    for index, values in enumerate(fitness):
-        rows = [
-            {"at": index, "of": particle, "value": _number(value)}
-            for particle, value in enumerate(values.tolist())
-        ]
-        connection.execute(judged, rows)
-        best = best_particle(values)
-        best_fitness = None if best is None else float(values[best])
-        summary = fitness_summary(values, best_fitness, best_so_far)
-        best_so_far = summary["best_so_far"]
-        connection.execute(update(iterations).where(_at(job_id, index)).values(**summary))
-
-
-def chain_iterations(
-    connection: Connection, job_id: str, documents: ChainDocuments, count: int
-) -> str:
-    """Store the digests of the copied iterations of a fork, and return the last."""
-    chained = (
-        update(iterations)
-        .where(_at(job_id, bindparam("at")))  # type: ignore[arg-type]
-        .values(digest=bindparam("chained"))
-    )
-    digest = documents.digest
-    for first, last in pairwise([*range(0, count, _ITERATIONS_AT_ONCE), count]):
-        rows = []
-        columns = _select_columns(connection, job_id, first, last)
-        reevaluated = dict(_select_reevaluations(connection, job_id, first, last))
-        for link in _select_links(connection, job_id, first, last):
+    for first, last in pairwise([*range(0, end, _ITERATIONS_AT_ONCE), end]):
+        columns = _select_columns(connection, parent, first, last)
+        reevaluated = dict(_select_reevaluations(connection, parent, first, last))
+        links = _select_links(connection, parent, first, last)
+        if columns is None or sum(link.committed for link in links) < last - first:
+            raise Conflict(
+                f"job {parent} has not the {end} iterations any more that were to be forked"
+            )
+        for link in links:
             index = link.iteration
-            assert columns is not None  # noqa: S101 - every iteration has designs
-            of_link = columns.of_iteration(index)
-            digest = iteration_digest(digest, documents, link, of_link, reevaluated.get(index))
-            rows.append({"at": index, "chained": digest})
-        connection.execute(chained, rows)
-    return digest
-
-
-def _best_columns(connection: Connection, job_id: str, precision: str) -> dict[str, Any]:
-    """Return the place of the best evaluation in double precision, the earliest of equals."""
-    table = evaluations.c if precision == "double" else reevaluations.c
-    query = (
-        select(table.fitness, table.iteration, table.particle)
-        .where(table.job_id == job_id, table.fitness.is_not(None))
-        .order_by(table.fitness, table.iteration, table.particle)
-        .limit(1)
-    )
-    row = connection.execute(query).first()
-    names = ("best_fitness", "best_iteration", "best_particle")
-    return {} if row is None else dict(zip(names, row, strict=True))
+            ask = Ask(index, link.positions, taken.state if index == end - 1 else {})
+            if index == end - 1:
+                link = replace(link, ask_digest=ask_digest(ask.positions, ask.state))  # noqa: PLW2901
+            insert_ask(connection, job, ask, expected=index, now=now, digest=link.ask_digest)
+            results = columns.of_iteration(index)
+            done = CompletedIteration(
+                index,
+                results.designs,
+                tuple(
+                    Outcome(results.objectives[:, case], results.statuses[:, case])
+                    for case in range(results.statuses.shape[1])
+                ),
+                results.fitness if taken.fitness is None else taken.fitness[index],
+                evaluate_seconds=0.0,
+                precision=precision,
+                reevaluation=reevaluated.get(index),
+            )
+            row = {**job, **changes}
+            changes |= _insert_results(connection, row, documents, link, done, now)
+    return changes | {"evaluations_saved": changes["evaluations"]}

@@ -607,16 +607,17 @@ def _remove_rows(connection: Connection) -> bool:
         return False
     place, of_job = evaluations.c.iteration, evaluations.c.job_id == job_id
     first = connection.execute(select(func.min(place)).where(of_job)).scalar()
+    end: int | None = None
     if first is not None:
         count = select(func.count()).where(of_job, place == first)
         end = first + max(1, _EVALUATIONS_AT_ONCE // connection.execute(count).scalar_one())
     for table in _OF_JOBS:
         rows = delete(table).where(table.c.job_id == job_id)
-        if first is None:
+        if end is None:
             connection.execute(rows)
         elif "iteration" in table.c:
             connection.execute(rows.where(table.c.iteration < end))
-    if first is None:
+    if end is None:
         connection.execute(delete(jobs).where(jobs.c.id == job_id))
     return True
 

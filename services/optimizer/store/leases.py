@@ -191,7 +191,7 @@ class Leases(Aggregate):
                 return JobState(row["state"])
             now = self._clock(connection)
             _require_budget(claim, row)
-            head = complete_iteration(connection, row, done, now)
+            progress = _progress(row, done) | complete_iteration(connection, row, done, now)
             if journaled:
                 clear_journal(connection, row)
             if following is not None:
@@ -201,7 +201,6 @@ class Leases(Aggregate):
                 state = JobState.SUCCEEDED
             elif state is JobState.PAUSING:
                 state = JobState.PAUSED
-            progress = _progress(row, done) | {"head": head}
             update_job(connection, row, entering(state, now) | progress)
         for observer in self._database.observers:
             observer.committed(claim, done, state)
@@ -341,23 +340,12 @@ def _require_budget(claim: Claim, row: Row) -> None:
 
 
 def _progress(job: Row, done: CompletedIteration) -> dict[str, Any]:
-    """Return the columns of progress after one more iteration."""
+    """Return the columns of progress, besides results, after one more iteration."""
     pace = done.evaluate_seconds / max(1, len(done.fitness))
-    columns: dict[str, Any] = {
+    return {
         "crashes": 0,
-        "iterations": done.iteration + 1,
-        "evaluations": job["evaluations"] + len(done.fitness),
         "evaluations_saved": job["evaluations_saved"] + done.saved,
         "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
         "recent_seconds": recent_pace(job["recent_seconds"], pace),
         "evaluated_on": done.evaluated_on,
     }
-    if done.best is not None:
-        particle, fitness = done.best
-        if job["best_fitness"] is None or fitness < job["best_fitness"]:
-            columns |= {
-                "best_fitness": fitness,
-                "best_iteration": done.iteration,
-                "best_particle": particle,
-            }
-    return columns

@@ -30,27 +30,20 @@ _WEIGHT: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """What one task simulates: designs `start` <= index < `stop` in some cases.
-
-    cost: simulated seconds that the kernel's lanes step through.
-    """
+    """What one task simulates: designs `start` <= index < `stop` in some cases."""
 
     cases: tuple[int, ...]
     start: int
     stop: int
-    cost: float
+    cost: float  # simulated time that the kernel's lanes step through [s]
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """Speed of a job's tasks.
+    """Speed of a job's tasks."""
 
-    seconds: per simulated second of their cost [s]; None before the first iteration has ended.
-    overhead: time to send a task and its answer [s].
-    """
-
-    seconds: float | None = None
-    overhead: float = 0.0
+    seconds: float | None = None  # per simulated second of cost [s]; None before any is measured
+    overhead: float = 0.0  # time to send a task and its answer [s]
 
     def after(self, times: Sequence[tuple[float, float, float]]) -> Pace:
         """Return the pace after another iteration.
@@ -92,13 +85,8 @@ def cut(
     A chunk has one case, and fills the kernel's lanes. With fewer slots than cases it has some
     designs in all cases: the kernel packs their simulations into its lanes without gaps.
 
-    Args:
-        durations: Simulated time of each case [s].
-        designs: Number of designs.
-        slots: Number of tasks that run concurrently.
-        lanes: Number of simulations that the kernel steps together.
-        pace: That of the job's earlier iterations.
-        together: Whether one task can simulate several cases.
+    durations: of each case [s]. lanes: simulations that the kernel steps together. together:
+    whether one task can simulate several cases.
     """
     bounds = (pace or Pace()).bounds(slots)
     if together and slots < len(durations):

@@ -62,10 +62,7 @@ class Engine(Protocol):
         """Return the handles of finished tasks; wait for one up to a time [s]."""
 
     def answer(self, handle: Any) -> Answer:
-        """Return the answer of a finished task.
-
-        Raises WorkerDied, TaskLost, or the error of the simulation.
-        """
+        """Return a finished task's answer; raise WorkerDied, TaskLost, or its own error."""
 
     def abandon(self, handles: Sequence[Any]) -> None:
         """End tasks whose answers are not needed any more. Returns at once."""

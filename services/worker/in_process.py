@@ -26,11 +26,7 @@ def available_cpus() -> int:
 class InProcessEvaluator:
     """`Evaluator` on threads, and the `Engine` of its tasks.
 
-    Args:
-        cpus: Number of threads; all processors by default.
-
-    Raises:
-        ValueError: cpus is less than 1.
+    cpus: number of threads; all processors by default. Raises ValueError if less than 1.
     """
 
     def __init__(self, cpus: int | None = None) -> None:
@@ -43,12 +39,10 @@ class InProcessEvaluator:
 
     @property
     def place(self) -> str:
-        """Number of threads, as text."""
         return f"threads: {self.slots}"
 
     @property
     def loads(self) -> dict[str, Load]:
-        """Load of the threads."""
         return {"threads": self._dispatcher.load(self.slots)}
 
     def evaluate(
@@ -64,7 +58,6 @@ class InProcessEvaluator:
         self._pool.shutdown()
 
     def submit(self, request: EvaluationRequest, chunk: Chunk, /) -> _Task:
-        """Queue a task for the threads."""
         abandoned = threading.Event()
 
         def in_vain() -> bool:
@@ -84,13 +77,11 @@ class InProcessEvaluator:
             raise
 
     def wait(self, handles: Sequence[_Task], seconds: float) -> Sequence[_Task]:
-        """Return the finished tasks; wait for one up to a time [s]."""
         futures = [future for future, _ in handles]
         done = wait(futures, timeout=seconds, return_when=FIRST_COMPLETED).done
         return [handle for handle in handles if handle[0] in done]
 
     def answer(self, handle: _Task) -> Answer:
-        """Return the answer of a finished task, or raise its error."""
         return handle[0].result()
 
     def abandon(self, handles: Sequence[_Task]) -> None:

@@ -68,9 +68,7 @@ class RayEvaluator:
     Ray is opened in the background from construction on. If it is lost, the next `evaluate` opens
     it again.
 
-    Args:
-        address: As for `open_ray`.
-        cpus: As for `open_ray`.
+    address, cpus: as for `open_ray`.
     """
 
     def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:
@@ -88,19 +86,16 @@ class RayEvaluator:
 
     @property
     def place(self) -> str:
-        """Numbers of CPUs and nodes, as text."""
         workers, nodes = self._connection.slots, self._connection.nodes
         plural = "" if workers == 1 else "s"
         return f"ray: {workers} worker{plural} on {nodes} node{'' if nodes == 1 else 's'}"
 
     @property
     def loads(self) -> dict[str, Load]:
-        """Load of the cluster; no slots while it is not open."""
         return {"ray": self._dispatcher.load(self._connection.slots)}
 
     @property
     def lost(self) -> bool:
-        """Whether the connection was lost, or could not be opened."""
         return self._connection.lost
 
     def trouble(self) -> str | None:
@@ -260,7 +255,6 @@ class _Connection:
         return done
 
     def answer(self, handle: Any) -> Answer:
-        """Return the answer of a finished task."""
         exceptions = self._ray.exceptions
         try:
             result: Answer | Failure = self._ray.get(handle)

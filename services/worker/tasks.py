@@ -26,25 +26,15 @@ from gaitswarm.sim.provenance import Provenance, provenance_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """Result of a task.
+    """Result of a task."""
 
-    Attributes:
-        outcomes: By case; None if the process was refused and has computed nothing.
-        provenance: Provenance of the process.
-        host: Name of its machine.
-        seconds: Computing time, without waiting for other threads [s].
-        kernel_time: Time in kernels, and the use of their lanes.
-        table_seconds: Time for fuzzy tables [s].
-        refusal: How the process differs from what the task requires.
-    """
-
-    outcomes: tuple[Outcome, ...] | None
-    provenance: Provenance
+    outcomes: tuple[Outcome, ...] | None  # by case; None if the process was refused
+    provenance: Provenance  # of the process
     host: str
-    seconds: float = 0.0
+    seconds: float = 0.0  # computing time, without waiting for other threads [s]
     kernel_time: KernelTime = field(default_factory=KernelTime)
-    table_seconds: float = 0.0
-    refusal: str = ""
+    table_seconds: float = 0.0  # time for fuzzy tables [s]
+    refusal: str = ""  # how the process differs from what the task requires
 
 
 def run_task(
@@ -72,14 +62,11 @@ def run_task(
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """What all tasks of a job need, sent to each process once.
-
-    arithmetic: `arithmetic_digest` of the process that asks.
-    """
+    """What all tasks of a job need, sent to each process once."""
 
     cases: tuple[Case, ...]
     provenance: Provenance
-    arithmetic: str
+    arithmetic: str  # `arithmetic_digest` of the process that asks
 
 
 @dataclass(frozen=True, slots=True)

@@ -393,22 +393,19 @@ def _postgresql_engine(url: sa.URL, options: dict[str, Any], *, unlimited: bool)
     transaction of a lost client, with its locks. Parameters in the URL take precedence.
     """
     probe = SILENCE_SECONDS // (_PROBES + 1)
+    probes = {"keepalives_idle": probe, "keepalives_interval": probe, "keepalives_count": _PROBES}
     connect_args: dict[str, Any] = {
         # The server cuts longer names.
         "application_name": f"gaitswarm {socket.gethostname()[:40]}:{os.getpid()}",
         "connect_timeout": SILENCE_SECONDS,
-        "keepalives_idle": probe,
-        "keepalives_interval": probe,
-        "keepalives_count": _PROBES,
         "tcp_user_timeout": SILENCE_SECONDS * 1000,
+        **probes,
     }
     connect_args = {name: value for name, value in connect_args.items() if name not in url.query}
     settings = {
         "lock_timeout": round(BUSY_SECONDS * 1000),
-        "tcp_keepalives_idle": probe,
-        "tcp_keepalives_interval": probe,
-        "tcp_keepalives_count": _PROBES,
         "tcp_user_timeout": SILENCE_SECONDS * 1000,
+        **{f"tcp_{name}": value for name, value in probes.items()},
     }
     if not unlimited:
         settings["statement_timeout"] = STATEMENT_SECONDS * 1000

@@ -149,7 +149,11 @@ class Audit(Aggregate):
         return Page(entries, str(entries[-1].index) if len(rows) > limit else None)
 
     def forget_audit_before(self, moment: datetime) -> int:
-        """Remove entries from before an aware time, and return their number."""
+        """Remove old entries, and return their number.
+
+        Args:
+            moment: aware time before which they were added.
+        """
         with self._database.write("forget_audit_before") as connection:
             return connection.execute(delete(audit).where(audit.c.at < moment)).rowcount
 

@@ -37,6 +37,7 @@ print(json.dumps({"written": written, "reached": reached, "threads": threads, "n
 """
 
 
+@pytest.mark.thorough("every module in a fresh process")
 @pytest.mark.slow
 def test_importing_every_module_has_no_side_effects(tmp_path: Path) -> None:
     done = subprocess.run(

@@ -120,6 +120,9 @@ def test_a_world_is_walked_again_by_its_number(files: Path) -> None:
     assert "efficiency_factor" in run_command(*command, "--db", files / "jobs.db").out
 
 
+@pytest.mark.thorough(
+    "test_a_design_is_certified_in_the_walks_and_by_the_preference_of_the_robots_folder"
+)
 def test_the_best_of_a_job_is_certified_with_its_robot_and_preference(files: Path) -> None:
     job = run_command(
         "optimize", "--controller", "pi", "--scenarios", files / "short.json", "--preference", "B",

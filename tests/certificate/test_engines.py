@@ -204,6 +204,7 @@ print("mujoco" in sys.modules)
 """
 
 
+@pytest.mark.thorough("test_without_the_library_the_error_names_the_extra_and_how_to_install_it")
 @pytest.mark.slow
 def test_mujoco_is_imported_for_its_own_walks_alone() -> None:
     done = python("-W", "ignore", "-c", PROGRAM)

@@ -72,6 +72,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str
     assert (done.returncode, done.stderr) == (ExitCode.OK, "")
 
 
+@pytest.mark.thorough("test_a_full_device_is_exit_code_5")
 @pytest.mark.variants
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
@@ -89,7 +90,7 @@ def test_closed_streams_are_no_error(finished: Finished, closed: str) -> None:
     assert (done.returncode, done.stderr) == (ExitCode.OK, "")
 
 
-@pytest.mark.thorough("test_a_full_device_is_exit_code_5", "test_closed_streams_are_no_error")
+@pytest.mark.thorough("test_a_full_device_is_exit_code_5")
 @pytest.mark.slow
 def test_messages_that_cannot_be_written_change_no_exit_code(finished: Finished) -> None:
     with Path("/dev/full").open("w") as full:

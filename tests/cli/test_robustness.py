@@ -75,6 +75,7 @@ def test_an_unknown_job_is_exit_code_3(gaitswarm: Gaitswarm, finished: Finished)
     assert gaitswarm("robustness", "nowhere", "--db", finished.db).code == 3
 
 
+@pytest.mark.thorough("test_a_published_design_has_an_index_by_scenario_objective_and_variable")
 def test_designs_are_drawn_side_by_side(
     gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
 ) -> None:

@@ -114,6 +114,7 @@ def test_an_optimization_cancelled_elsewhere_reports_it(
     assert f"gaitswarm history {job_id} --db {db}" in err
 
 
+@pytest.mark.thorough("test_a_log_is_recorded_once_fitted_and_judged")
 def test_identify_follows_runs_that_a_server_claims(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, tmp_path: Path, server: str
 ) -> None:

@@ -94,6 +94,7 @@ def test_untouched_evidence_is_verified_in_all_it_says(proved: Proved) -> None:
     assert found.provenance == []
 
 
+@pytest.mark.thorough("test_untouched_evidence_is_verified_in_all_it_says, by another process")
 def test_it_is_verified_by_a_process_in_another_folder_without_a_database(
     proved: Proved, tmp_path: Path
 ) -> None:
@@ -219,6 +220,7 @@ def test_a_search_in_single_precision_is_verified_with_its_best_in_double(tmp_pa
     assert failed(gaitswarm.verify(content, replay=1)) == ["best", "chain", "replay"]
 
 
+@pytest.mark.thorough("test_untouched_evidence_is_verified_in_all_it_says, of a fork")
 def test_a_fork_that_was_judged_by_another_preference_is_verified_but_for_the_way_of_its_search(
     proved: Proved, tmp_path: Path
 ) -> None:

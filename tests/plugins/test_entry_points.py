@@ -134,6 +134,7 @@ def test_names_of_gaitswarm_are_answered_without_looking_for_plug_ins() -> None:
     assert find_plugins.cache_info().misses == 0
 
 
+@pytest.mark.thorough("the suites in a process of their own")
 @pytest.mark.slow
 def test_the_suites_are_imported_without_a_test_runner() -> None:
     assert loaded_by("import gaitswarm.testing", ["pytest"]) == set()

@@ -66,7 +66,7 @@ def test_neighbours_of_a_round_hexapod_step_in_turns() -> None:
         assert phases in ([0.0, 0.5] * 3, [0.5, 0.0] * 3)
 
 
-@pytest.mark.variants("four", "six")
+@pytest.mark.variants
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
     proposal, _ = made(layout)
@@ -75,7 +75,7 @@ def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
     assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)
 
 
-@pytest.mark.variants("four", "six")
+@pytest.mark.variants
 @pytest.mark.parametrize("layout", [layout for layout in LAYOUTS if layout != "two"])
 def test_of_some_designs_a_round_robot_walks_both_of_its_walks(layout: str) -> None:
     proposal, robot = made(layout)

@@ -186,6 +186,7 @@ def test_secrets_that_must_be_given_are_in_the_example() -> None:
     assert re.search(r"^\.env$", (ROOT / ".gitignore").read_text(encoding="utf-8"), re.MULTILINE)
 
 
+@pytest.mark.thorough("the health check of a container, as a process")
 def test_the_api_is_asked_for_its_health_where_it_answers() -> None:
     paths = set(api_document()["paths"])
     (asked,) = re.findall(r"http://127\.0\.0\.1:8000(/[\w/]*)", DOCKERFILE)

@@ -41,6 +41,7 @@ assert RandomNumbers(1, 0).normal(3).shape == (3,)
 """
 
 
+@pytest.mark.thorough("scipy in a process of little memory")
 def test_scipy_is_not_loaded_where_its_openblas_would_try_for_ever_to_find_memory() -> None:
     try:
         ended = python("-c", SHORT, timeout=60)

@@ -144,6 +144,7 @@ def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> N
     assert validate(measured, "--report", tmp_path / "file").code == 2
 
 
+@pytest.mark.thorough("test_json_is_the_whole_comparison, of another robot")
 def test_a_custom_robot_is_validated_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

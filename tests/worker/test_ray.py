@@ -111,6 +111,7 @@ def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continu
     assert capfd.readouterr().out == ""
 
 
+@pytest.mark.thorough("test_work_is_dropped_when_it_is_stopped")
 @pytest.mark.slow
 def test_tasks_that_are_not_awaited_any_more_leave_their_slots(
     ray_evaluator: RayEvaluator,

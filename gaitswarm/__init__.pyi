@@ -6,7 +6,7 @@ from gaitswarm.jobs.base import JobEvent, Jobs
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
-from gaitswarm.optimization import OptimizationResult, optimize, optimizers
+from gaitswarm.optimization import OptimizationResult, optimize
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
@@ -63,6 +63,7 @@ from gaitswarm.simulation import ScenarioResult, SimulationResult, simulate
 from gaitswarm.specs import SpecOptions, job_spec
 from gaitswarm.surface import SurfaceView
 from gaitswarm.tables import EvaluationTable, Table
+from gaitswarm.views.catalogue import optimizers
 from gaitswarm.views.job import (
     BestView,
     HistoryIterationView,

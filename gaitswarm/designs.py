@@ -14,7 +14,7 @@ from gaitswarm.robots import DEFAULT_CONTROLLER, DEFAULT_PREFERENCE
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Request
-from gaitswarm.sim.assembly import Backend, check_precision
+from gaitswarm.sim.assembly import check_precision
 from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
@@ -160,7 +160,6 @@ class WorldRequest(DesignRequest):
         *,
         log: bool,
         precision: Precision = "double",
-        backend: Backend = "auto",
     ) -> Simulation:
         """Simulate the design, or others of the same variables, in a scenario of its world."""
         if designs is None:
@@ -174,7 +173,6 @@ class WorldRequest(DesignRequest):
             designs,
             robot=self.robot,
             log=log,
-            backend=backend,
             precision=precision,
         )
 

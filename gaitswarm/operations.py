@@ -65,7 +65,7 @@ from gaitswarm.views.catalogue import (
     ScenarioView,
     case_views,
     controller_views,
-    optimizer_views,
+    optimizers,
     plugin_views,
     preference_views,
     robot_views,
@@ -324,7 +324,7 @@ class ServedJobs(DatabaseJobs):
     @robots("GET /optimizers", "list_optimizers", "List optimizers")
     def list_optimizers(self) -> CatalogueView[OptimizerView]:
         """Return search methods with their settings, by the names that jobs use."""
-        return CatalogueView(items=optimizer_views())
+        return CatalogueView(items=optimizers())
 
     @robots("GET /controllers", "list_controllers", "List controllers")
     def list_controllers(self) -> CatalogueView[ControllerView]:

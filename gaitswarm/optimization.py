@@ -20,7 +20,6 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.specs import SpecInput, SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
-from gaitswarm.views.catalogue import OptimizerView, optimizer_views
 from gaitswarm.views.job import BestView, IterationView, JobView
 
 
@@ -156,12 +155,3 @@ def optimize(
         if job.state is not JobState.SUCCEEDED:
             raise JobEnded(job)
         return OptimizationResult(job, tuple(jobs.iterations(job.id)), jobs.url)
-
-
-def optimizers() -> list[OptimizerView]:
-    """List the search methods, and presets of them, that `optimizer` may name.
-
-    Returns:
-        Each with its description, its settings and their JSON schema.
-    """
-    return optimizer_views()

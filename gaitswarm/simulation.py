@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,6 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View, finite
-from gaitswarm.sim.assembly import Backend
 from gaitswarm.sim.case import Case, MeasuredWalk
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -345,7 +344,6 @@ def simulate(
     precision: Precision = "double",
     world: Mapping[str, float] | None = None,
     log: bool = False,
-    backend: Backend = "auto",
     cpus: int | None = None,
 ) -> SimulationResult:
     """Simulate one design or many.
@@ -368,8 +366,6 @@ def simulate(
         world: Perturbations of the model, as `values` of a certificate's worlds: numbers by
             perturbation, nominal where there is none; None for the model itself.
         log: Whether to record every simulation at 500 Hz.
-        backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
-            first that works on this machine; `auto` alone in another world than the model's.
         cpus: Threads, for many designs without a log; default all processors.
 
     Returns:
@@ -398,16 +394,10 @@ def simulate(
         raise InvalidRequest(
             f"{variables[column]} is not a finite number in design {row}", field="designs"
         )
-    if backend not in get_args(Backend):
-        raise InvalidRequest(
-            f"{backend!r} is none of {', '.join(get_args(Backend))}", field="backend"
-        )
-    if request.world and backend != "auto":
-        raise InvalidRequest("perturbed worlds choose it themselves; leave it out", field="backend")
     if cpus is not None and cpus < 1:
         raise InvalidRequest("must be at least 1", field="cpus")
     with simulation_errors("designs"):
-        return _simulated(request, rows, backend=backend, cpus=cpus)
+        return _simulated(request, rows, cpus=cpus)
 
 
 def run_simulation(request: SimulationRequest) -> SimulationView:
@@ -425,18 +415,15 @@ def _simulated(
     request: SimulationRequest,
     designs: Floats,
     *,
-    backend: Backend = "auto",
     cpus: int | None = None,
 ) -> SimulationResult:
     """Simulate designs with the variables of the request's, many of them in threads."""
     scenarios, variables = request.resolved_scenarios(), tuple(request.design)
     logs: dict[str, tuple[WalkLog | None, ...]] = {}
-    if len(designs) == 1 or request.log or backend != "auto":
+    if len(designs) == 1 or request.log:
         parts = []
         for scenario in scenarios:
-            walk = request.walk(
-                scenario, designs, log=request.log, precision=request.precision, backend=backend
-            )
+            walk = request.walk(scenario, designs, log=request.log, precision=request.precision)
             columns = [walk.outcome.objectives, walk.measurements.array()]
             parts.append(Outcome(np.concatenate(columns, axis=1), walk.outcome.statuses))
             if request.log:

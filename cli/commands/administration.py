@@ -254,9 +254,9 @@ def audit(
 
 def optimizers() -> Printed:
     """List search methods and their settings."""
-    from gaitswarm.views.catalogue import optimizer_views
+    from gaitswarm.views.catalogue import optimizers
 
-    views = optimizer_views()
+    views = optimizers()
     rows = (
         (view.name, _described(view), _settings(view.settings.model_dump(exclude={"name"})))
         for view in views

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 from gaitswarm.errors import Interrupted, simulation_errors
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
-from gaitswarm.services.optimizer.analysis.history import read_columns, read_history
+from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.tables import EvaluationTable
-from gaitswarm.views.job import HistoryIterationView, IterationView, JobView, StateView
+from gaitswarm.views.job import IterationView, JobView, StateView
 
 if TYPE_CHECKING:
     from gaitswarm.services.runtime import EvaluatorKind
@@ -44,13 +44,7 @@ class DatabaseJobs(Jobs):
     def __init__(
         self, service: JobService, url: str, *, poll_seconds: float = POLL_SECONDS
     ) -> None:
-        """Take over a service.
-
-        Args:
-            service: Of the database; closed with this.
-            url: Of the database, as it was opened.
-            poll_seconds: Time between two readings of a followed job [s].
-        """
+        """Take over a service; a followed job is read every `poll_seconds`."""
         self._service = service
         self._url = url
         self._poll_seconds = poll_seconds
@@ -101,12 +95,6 @@ class DatabaseJobs(Jobs):
                 return
             if not stop.wait(self._poll_seconds):
                 return
-
-    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """Read committed iterations with their designs, many at once."""
-        spec = self._service.job(job_id).spec
-        for iteration, evaluations in read_history(self._service.store, job_id):
-            yield HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, spec)
 
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Read every evaluation."""

@@ -84,18 +84,10 @@ class ServerJobs(Jobs):
         headers: Mapping[str, str] | None = None,
         transport: httpx2.BaseTransport | None = None,
     ) -> None:
-        """Create a client; nothing is sent yet.
+        """Create a client, as `gaitswarm.connect` does; nothing is sent yet.
 
-        Args:
-            url: Of the server, such as http://127.0.0.1:8000.
-            timeout: Longest silence of the server [s].
-            backoff: Waits before requests are repeated.
-            reconnect: Waits before a broken event stream is resumed; every event resets them.
-            headers: Sent with every request, such as a proxy requires.
-            transport: Sends requests, in place of httpx2's own.
-
-        Raises:
-            InvalidRequest: It is not a URL.
+        `reconnect` has the waits before a broken event stream is resumed; every event resets them.
+        `transport` sends requests in place of httpx2's own.
         """
         self._url = server_url(url)
         self._backoff = backoff
@@ -302,11 +294,7 @@ def authorities(url: str) -> ssl.SSLContext | bool:
 
 
 class Attempts:
-    """The attempts at one request.
-
-    A request is repeated after a lost connection or a 503 if it is `repeatable`: if it only reads
-    or has an idempotency key. After a 429, which says that nothing was done, every request is.
-    """
+    """The attempts at one request; see `ServerJobs`."""
 
     def __init__(self, url: str, backoff: Backoff, *, repeatable: bool) -> None:
         self._url = url

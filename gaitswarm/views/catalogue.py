@@ -163,8 +163,12 @@ def preference_views() -> list[PreferenceView]:
     return [PreferenceView(name=name, **dict(p)) for name, p in PREFERENCES.items()]
 
 
-def optimizer_views() -> list[OptimizerView]:
-    """Every search method and preset, `auto` first."""
+def optimizers() -> list[OptimizerView]:
+    """List the search methods, and presets of them, that `optimizer` may name.
+
+    Returns:
+        Each with its description, its settings and their JSON schema.
+    """
     return [
         OptimizerView(
             name=name,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import (
     DELETABLE,
     TRANSITIONS,
@@ -103,14 +103,6 @@ class HistoryIterationView(IterationView):
     """One committed iteration with every design."""
 
     evaluations: list[EvaluationView] = Field(description="Every design, in order.")
-
-    @classmethod
-    def from_iteration_and_evaluations(
-        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
-    ) -> HistoryIterationView:
-        """Make a view of an iteration with its designs."""
-        particles = evaluation_views(evaluations, spec)
-        return cls.model_validate({**asdict(iteration), "evaluations": particles})
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,7 +262,7 @@ class JobSummaryView(View):
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(
-        description="Links to its resources, and those of the commands that its state allows.",
+        description="Paths of the job and of the commands that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -368,60 +360,49 @@ class StateView(View):
     @classmethod
     def from_job(cls, job: Job) -> StateView:
         """Make a view of a job's present state."""
-        return cls(
-            id=job.id,
-            state=job.state,
-            error=job.error,
-            iterations=job.progress.iterations,
-            evaluations=job.progress.evaluations,
-            waiting=job.waiting,
-        )
+        return cls(**_fields(cls, job.progress, job))
 
 
-def _summary(job: Job) -> dict[str, object]:
-    progress, rates, spec = job.progress, time_left(job, datetime.now(UTC)), job.stored_spec
-    of_spec: dict[str, object] = {
-        "kind": None,
-        "scenarios": [],
-        "precision": None,
-        "optimizer": None,
-        "particles": spec.particles if isinstance(spec, UnreadableSpec) else 0,
-        "iterations_planned": spec.iterations,
+def _fields(view: type[View], *sources: object) -> dict[str, Any]:
+    """Read the fields of a view from the attributes of objects; the last that has one counts."""
+    return {
+        name: getattr(source, name)
+        for source in sources
+        for name in view.model_fields
+        if hasattr(source, name)
     }
-    if isinstance(spec, UnreadableSpec):
-        of_spec["evaluations_planned"] = spec.iterations * spec.particles
-    else:
-        cases = list(spec.case_names)
-        if isinstance(spec, JobSpec):
-            # Its cases are each scenario in every world.
-            cases = [scenario.name for scenario in spec.resolved_scenarios()]
-        of_spec |= {
+
+
+def _summary(job: Job) -> dict[str, Any]:
+    rates, spec = time_left(job, datetime.now(UTC)), job.stored_spec
+    readable: dict[str, Any] = {}
+    if not isinstance(spec, UnreadableSpec):
+        readable = {
             "kind": spec.kind,
-            "scenarios": cases,
+            "scenarios": list(spec.case_names),
             "precision": spec.precision,
             "optimizer": spec.optimizer.name,
             "particles": spec.optimizer.particles,
             "evaluations_planned": spec.budget,
         }
-    named = ("id", "name", "state", "waiting", "lineage", "owner", "kept", "priority", "archived")
-    times = ("created_at", "updated_at", "started_at", "finished_at")
-    of_progress = ("iterations", "evaluations", "evaluations_saved", "best_fitness")
+    if isinstance(spec, JobSpec):
+        # Its cases are each scenario in every world.
+        readable["scenarios"] = [scenario.name for scenario in spec.resolved_scenarios()]
+        readable["controller"] = spec.controller
+    particles = getattr(spec, "particles", 0)
     return {
-        **{field: getattr(job, field) for field in (*named, *times, "gain", "evaluated_on")},
-        **{field: getattr(progress, field) for field in (*of_progress, "best_iteration")},
-        **of_spec,
+        **dict.fromkeys(("kind", "precision", "optimizer", "controller")),
+        **_fields(JobSummaryView, job.labels, job.progress, rates, job),
+        "scenarios": [],
+        "particles": particles,
+        "iterations_planned": spec.iterations,
+        "evaluations_planned": spec.iterations * particles,
+        **readable,
         "error": job.error or getattr(spec, "reason", None),
         "robot": robot_name(getattr(spec, "robot", None)),
         "preference": preference_name(getattr(spec, "preference", None)),
-        "controller": spec.controller if isinstance(spec, JobSpec) else None,
         "reference": ReferenceView.from_reference(job.reference),
-        "compute_seconds": progress.compute_seconds,
-        "evaluations_per_second": rates.evaluations_per_second,
-        "simulations_per_second": rates.simulations_per_second,
-        "eta_seconds": rates.eta_seconds,
         "eta_basis": rates.basis,
-        "note": job.labels.note,
-        "tags": job.labels.tags,
         "links": _links(job),
     }
 
@@ -437,12 +418,6 @@ class JobFacetsView(View):
     tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])
 
 
-_RESOURCES: Final = ("iterations", "events")
-_OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
-
-_RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
-"""Links of jobs whose spec can be read."""
-
 _COMMANDS: Final = {
     state: [(c.value, after) for (before, c), after in TRANSITIONS.items() if before is state]
     for state in JobState
@@ -451,28 +426,19 @@ _COMMANDS: Final = {
 
 
 def _links(job: Job) -> dict[str, str]:
-    """Return the links of a job."""
     here = f"{PREFIX}/jobs/{job.id}"
-    names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
-    if isinstance(job.stored_spec, JobSpec):
-        names += ["ranking", *(_OF_A_BEST if job.progress.best_fitness is not None else ())]
-    resources = {name: f"{here}/{name}" for name in names}
-    commands = {
-        command: f"{here}/{command}"
+    names = [
+        command
         for command, after in _COMMANDS[job.state]
         if job.readable or after is not JobState.QUEUED
-    }
+    ]
     if job.readable and job.state is not JobState.CANCELLED:
-        commands["extend"] = f"{here}/extend"
+        names.append("extend")
     if job.readable and job.progress.iterations:
-        resources["evidence"] = f"{here}/evidence"
-        resources["verify"] = f"{here}/verify"
-        commands["fork"] = f"{here}/fork"
-    commands["keep"] = f"{here}/keep"
+        names.append("fork")
     if not job.state.terminal:
-        commands["priority"] = f"{here}/priority"
+        names.append("priority")
+    links = {"self": here} | {name: f"{here}/{name}" for name in (*names, "keep")}
     if job.state in DELETABLE and not job.kept:
-        commands["delete"] = here
-    if job.lineage is not None:
-        resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"
-    return {"self": here, **resources, **commands}
+        links["delete"] = here
+    return links

@@ -18,7 +18,7 @@ def test_winners_are_listed_from_what_is_stored(
     client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
-    path = client.get(f"/v1/jobs/{job.id}").json()["links"]["preferences"]
+    path = f"/v1/jobs/{job.id}/preferences"
     view = client.post(path, json={"drawn": 64, "seed": 3}).json()
     assert (view["drawn"], view["seed"], view["samples"]) == (64, 3, 0)
     # The results are made up: one particle is the best in every objective.

@@ -18,7 +18,7 @@ from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
 from gaitswarm.simulation import SimulationView, WalkLogView
-from gaitswarm.views.job import BestView, HistoryIterationView, JobView
+from gaitswarm.views.job import BestView, JobView
 from tests.api.conftest import Commit
 
 
@@ -72,23 +72,6 @@ def test_a_design_that_was_never_walked_has_no_log() -> None:
     assert (scenario.status, scenario.log) == ("unreachable", None)
     assert set(dict(scenario.measurements).values()) == {None}
     assert view.fitness is None
-
-
-def test_a_history_keeps_every_bit_of_designs_and_objectives(
-    store: Store, job: Job, commit: Commit
-) -> None:
-    commit(job, 1)
-    (iteration,) = store.iterations(job.id).items
-    evaluations = store.evaluations(job.id, 0)
-
-    view = HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, job.spec)
-
-    for shown, stored in zip(
-        strict(view.model_dump_json())["evaluations"], evaluations, strict=True
-    ):
-        assert list(shown["design"].values()) == stored.design.tolist()
-        objectives = shown["scenarios"]["normal-fast"]["objectives"]
-        assert list(objectives.values()) == stored.objectives[0].tolist()
 
 
 def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(

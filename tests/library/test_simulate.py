@@ -149,7 +149,6 @@ MISTAKES: dict[str, tuple[Any, dict[str, Any], str]] = {
     "unknown preference": (PI, {"preference": "Z"}, "preference"),
     "unknown robot": (PI, {"robot": "spot"}, "robot"),
     "a folder without a robot": (PI, {"robot": Path(__file__).parent}, "robot"),
-    "unknown backend": (PI, {"backend": "abacus"}, "backend"),
     "no processor": (PI, {"cpus": 0}, "cpus"),
 }
 

@@ -47,9 +47,3 @@ def test_a_world_that_cannot_be_is_refused_with_its_field(
     with pytest.raises(gaitswarm.InvalidRequest, match=said) as refused:
         gaitswarm.simulate(PI, world=world, **ASKED)
     assert refused.value.field == field
-
-
-def test_a_world_chooses_its_kernel() -> None:
-    with pytest.raises(gaitswarm.InvalidRequest) as refused:
-        gaitswarm.simulate(PI, world=WORLD, backend="native", **ASKED)
-    assert refused.value.field == "backend"

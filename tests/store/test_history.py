@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
-from gaitswarm.services.optimizer.analysis.history import read_history
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState
 from gaitswarm.services.optimizer.store import Store
@@ -178,18 +177,6 @@ def test_evaluations_of_several_iterations_come_in_order(store: Store) -> None:
     job_id = run(store, *[(1.0, 2.0)] * 4).job.id
     found = store.evaluations_between(job_id, 1, 3)
     assert [(e.iteration, e.particle) for e in found] == [(1, 0), (1, 1), (2, 0), (2, 1)]
-
-
-def test_the_whole_history_is_read_piece_by_piece(store: Store) -> None:
-    claim = run(store, *[(1.0, 2.0)] * 20)
-    history = read_history(store, claim.job.id)
-    head = next(history)
-    # A reader that dawdles holds no transaction open, so the job goes on and is followed.
-    store.commit(claim, completed(20), ask(21))
-    rest = list(history)
-    assert [iteration.index for iteration, _ in [head, *rest]] == list(range(21))
-    assert all([e.particle for e in found] == [0, 1] for _, found in rest)
-    assert all(e.iteration == iteration.index for iteration, found in rest for e in found)
 
 
 def test_states_are_kept_of_the_last_commit_and_the_next_ask_alone(

@@ -6,14 +6,13 @@ import threading
 import weakref
 from collections import OrderedDict
 from collections.abc import Iterator
-from itertools import chain, groupby
-from operator import attrgetter
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Iteration
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 
 if TYPE_CHECKING:
@@ -21,29 +20,6 @@ if TYPE_CHECKING:
 
 PIECE: Final = 2000
 """Evaluations per transaction."""
-
-_PIECE_ITERATIONS: Final = 16
-
-
-def read_history(store: Store, job_id: str) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-    """Yield committed iterations with their evaluations, read piece by piece.
-
-    No transaction stays open, and iterations committed meanwhile are included.
-    """
-    after: int | None = None
-    while True:
-        page = store.iterations(job_id, after=after, limit=_PIECE_ITERATIONS)
-        if page.items:
-            first, last = page.items[0].index, page.items[-1].index
-            evaluations = store.evaluations_between(job_id, first, last + 1)
-            by_iteration = {
-                k: tuple(g) for k, g in groupby(evaluations, key=attrgetter("iteration"))
-            }
-            for iteration in page.items:
-                yield iteration, by_iteration.get(iteration.index, ())
-            after = last
-        if page.next is None:
-            return
 
 
 def read_columns(

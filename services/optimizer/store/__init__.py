@@ -47,12 +47,6 @@ class Store(Jobs, Leases, History, Recordings, Audit):
         actor: name of a token, or `LOCAL`, for the audit log.
         quota: limit on what the owner has unfinished; QuotaExceeded beyond it.
 
-    Attributes:
-        tokens: access tokens.
-        outbox: notifications about ended jobs.
-        changes: changes of jobs, by any process.
-        observers: receive what this process does with the store.
-
     Args:
         database: of the newest schema; closed with the store.
         clock: time of all that is stored; only tests need another than the database's, which all
@@ -64,7 +58,7 @@ class Store(Jobs, Leases, History, Recordings, Audit):
         self.tokens = Tokens(database, clock)
         self.outbox = Outbox(database, clock)
         self.changes = Changes(database)
-        self.observers: list[Observer] = database.observers
+        self.observers: list[Observer] = database.observers  # of this process's transactions
 
     def ping(self) -> None:
         """Raise StoreUnavailable unless the database answers and has this version's schema."""

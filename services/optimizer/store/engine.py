@@ -49,6 +49,9 @@ _PROBES: Final = 2
 _CACHE_KIB: Final = 8192
 _WRITE: Final = "gaitswarm_write"
 
+_STRICT_JSON: Final = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
+"""Without NaN and infinity, which PostgreSQL refuses; floats keep every bit."""
+
 Clock = Callable[[sa.Connection], datetime]
 """Returns the aware time inside a transaction."""
 
@@ -107,11 +110,7 @@ class Observer(Protocol):
 class Database:
     """Connections to a database and their transactions. Thread-safe; connects when first used.
 
-    Attributes:
-        url: parsed.
-        name: in messages, without password.
-        path: of an SQLite file; None for a server.
-        observers: of this process's use of the database.
+    name: in messages, without password. path: of an SQLite file; None for a server.
     """
 
     def __init__(self, url: str | sa.URL, *, for_migration: bool = False) -> None:
@@ -123,7 +122,7 @@ class Database:
         self.url = parse_url(url) if isinstance(url, str) else url
         self.observers: list[Observer] = []
         self._file: _OpenFile | None = None
-        options: dict[str, Any] = {"json_serializer": _strict_json}
+        options: dict[str, Any] = {"json_serializer": _STRICT_JSON.encode}
         if for_migration:
             options |= {"poolclass": sa.NullPool}
         else:
@@ -251,12 +250,7 @@ class Database:
 
 
 class Aggregate:
-    """A part of the store. Thread-safe; every method is one transaction unless it says otherwise.
-
-    Args:
-        database: of the newest schema.
-        clock: time of all that is stored.
-    """
+    """A part of the store. Thread-safe; a method is one transaction unless it says otherwise."""
 
     def __init__(self, database: Database, clock: Clock = database_time) -> None:
         self._database = database
@@ -272,11 +266,6 @@ def _cause(error: DatabaseError | InterfaceError | PoolTimeout) -> str:
     if "unable to open" in text:
         return f"{text}: check that its directory exists and that you may write there"
     return text
-
-
-def _strict_json(value: object) -> str:
-    """Serialize without NaN and infinity, which PostgreSQL refuses; floats keep every bit."""
-    return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
 SYNCHRONOUS = "FULL"

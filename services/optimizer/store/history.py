@@ -24,7 +24,6 @@ from sqlalchemy import (
     Table,
     Text,
     cast,
-    delete,
     func,
     insert,
     select,
@@ -461,11 +460,6 @@ def journal_of(connection: Connection, job: Row) -> tuple[JournalEntry, ...]:
     of_ask = (journal.c.job_id == job["id"]) & (journal.c.iteration == job["iterations"])
     query = select(journal).where(of_ask).order_by(journal.c.id)
     return tuple(_journal_entry(row) for row in connection.execute(query).mappings())
-
-
-def clear_journal(connection: Connection, job: Row) -> None:
-    """Remove all entries of a job."""
-    connection.execute(delete(journal).where(journal.c.job_id == job["id"]))
 
 
 def _journal_entry(row: Row) -> JournalEntry:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, not_, or_, select
+from sqlalchemy import ColumnElement, Connection, and_, delete, not_, or_, select
 
 from gaitswarm.services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
 from gaitswarm.services.optimizer.jobs.estimate import recent_pace
@@ -26,7 +26,6 @@ from gaitswarm.services.optimizer.jobs.provenance import RECORDS, JobProvenance,
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import (
     answered_ask,
-    clear_journal,
     complete_iteration,
     insert_ask,
     insert_entries,
@@ -45,7 +44,7 @@ from gaitswarm.services.optimizer.store.job_rows import (
     update_job,
 )
 from gaitswarm.services.optimizer.store.recordings import load_recordings
-from gaitswarm.services.optimizer.store.tables import Row, jobs
+from gaitswarm.services.optimizer.store.tables import Row, jobs, journal
 
 _log = logging.getLogger(__name__)
 
@@ -193,7 +192,7 @@ class Leases(Aggregate):
             _require_budget(claim, row)
             progress = _progress(row, done) | complete_iteration(connection, row, done, now)
             if journaled:
-                clear_journal(connection, row)
+                connection.execute(delete(journal).where(journal.c.job_id == row["id"]))
             if following is not None:
                 insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
             state = JobState(row["state"])

@@ -105,18 +105,12 @@ def restore(url: str, file: Path, *, overwrite: bool = False) -> None:
 @contextmanager
 def _temporary_file(folder: Path, what: str) -> Iterator[Path]:
     try:
-        handle, name = tempfile.mkstemp(dir=folder, prefix=".gaitswarm-", suffix=".db")
-    except OSError as error:
-        raise StoreUnavailable(f"{what}: cannot write to {folder}: {error.strerror}") from error
-    os.close(handle)
-    path = Path(name)
-    try:
-        yield path
-    except sqlite3.Error as error:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".gaitswarm-") as directory:
+            path = Path(directory, "copy.db")
+            path.touch(mode=0o600)
+            yield path
+    except (OSError, sqlite3.Error) as error:
         raise StoreUnavailable(f"{what}: {error}") from error
-    finally:
-        for end in ("", "-wal", "-shm", "-journal"):
-            path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def _copy_file(source: Path, target: Path) -> None:

@@ -29,11 +29,9 @@ MIGRATIONS: Final = Path(__file__).with_name("migrations")
 _MIGRATING: Final = 0x6761_6974_7377_6D01
 _IN_USE: Final = 0x6761_6974_7377_6D02
 
-_alembic_version: Final = sa.Table(
-    "alembic_version",
-    sa.MetaData(),
-    sa.Column("version_num", sa.String(32), nullable=False),
-    sa.PrimaryKeyConstraint("version_num", name="alembic_version_pkc"),
+_VERSION_TABLE: Final = (
+    "CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL,"
+    " CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
 )
 """Alembic's own table."""
 
@@ -121,8 +119,9 @@ def create(url: sa.URL) -> None:
                     )
                 # Migrating, and importing Alembic, takes ten times as long.
                 metadata.create_all(connection, checkfirst=False)
-                _alembic_version.create(connection)
-                connection.execute(_alembic_version.insert().values(version_num=head()))
+                connection.exec_driver_sql(_VERSION_TABLE)
+                added = sa.text("INSERT INTO alembic_version VALUES (:head)")
+                connection.execute(added, {"head": head()})
 
 
 def upgrade(url: str) -> str | None:

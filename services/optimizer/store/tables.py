@@ -90,8 +90,7 @@ jobs: Final = sa.Table(
     sa.Column("budget", sa.Integer),
     # Of the request with the idempotency key; NULL without a key.
     sa.Column("request_digest", sa.Text),
-    # `ProvenanceRecords`.
-    sa.Column("provenance", sa.JSON(none_as_null=True)),
+    sa.Column("provenance", sa.JSON(none_as_null=True)),  # `ProvenanceRecords`
     # See `Job.accepts_changes`.
     sa.Column("accepts_changes", sa.Boolean, nullable=False, server_default=sa.false()),
     # Evaluations answered from the cache, and those taken over by a fork.
@@ -100,30 +99,22 @@ jobs: Final = sa.Table(
     # Of a fork; no foreign key, as a fork outlives its parent.
     sa.Column("parent_id", sa.Text, index=True),
     sa.Column("lineage", sa.JSON(none_as_null=True)),
-    # Name of the token it was submitted with; NULL for none.
-    sa.Column("owner", sa.Text),
+    sa.Column("owner", sa.Text),  # name of the token it was submitted with; NULL for none
     # Consecutive claims whose lease expired.
     sa.Column("crashes", sa.Integer, nullable=False, server_default="0"),
-    # Reason for waiting while running; NULL if it does not wait.
-    sa.Column("waiting", sa.Text),
-    # `Progress.recent_seconds`.
-    sa.Column("recent_seconds", sa.Double),
-    # Digest of the last committed iteration; NULL before the first.
-    sa.Column("head", sa.Text),
-    # URL notified of the job's end.
-    sa.Column("notify_url", sa.Text),
-    # Set from deletion until all rows are removed.
-    sa.Column("deleted_at", UtcDateTime),
+    sa.Column("waiting", sa.Text),  # reason for waiting while running; NULL if it does not wait
+    sa.Column("recent_seconds", sa.Double),  # `Progress.recent_seconds`
+    sa.Column("head", sa.Text),  # digest of the last committed iteration; NULL before the first
+    sa.Column("notify_url", sa.Text),  # URL notified of the job's end
+    sa.Column("deleted_at", UtcDateTime),  # set from deletion until all rows are removed
     # Protected from deletion.
     sa.Column("kept", sa.Boolean, nullable=False, server_default=sa.false()),
     # Simulated time of the whole budget [s]; NULL if unknown.
     sa.Column("simulated_seconds", sa.Double),
     # Higher priorities are claimed first.
     sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
-    # `Labels`; NULL for none.
-    sa.Column("labels", sa.JSON(none_as_null=True)),
-    # Hidden in lists.
-    sa.Column("archived", sa.Boolean, nullable=False, server_default=sa.false()),
+    sa.Column("labels", sa.JSON(none_as_null=True)),  # `Labels`; NULL for none
+    sa.Column("archived", sa.Boolean, nullable=False, server_default=sa.false()),  # hidden in lists
     # `Reference`; NULL until determined, the kind until then only.
     sa.Column("reference_name", sa.Text),
     sa.Column("reference_fitness", sa.Double),
@@ -134,8 +125,7 @@ jobs: Final = sa.Table(
     # Folded name and searched text; sorted by code points in both databases.
     sa.Column("sort_name", sa.Text().with_variant(sa.Text(collation="C"), "postgresql")),
     sa.Column("search_text", sa.Text),
-    # Where the last iteration was simulated; NULL if unknown.
-    sa.Column("evaluated_on", sa.Text),
+    sa.Column("evaluated_on", sa.Text),  # where the last iteration was simulated; NULL if unknown
     sa.Index(None, "created_at", "id"),
     sa.Index(None, "state", "created_at", "id"),
     # Of deleted jobs only: SQLite would use a full index to find all others, and sort these.

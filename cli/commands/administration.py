@@ -70,10 +70,7 @@ def backup(
     force: Force = False,
     db: Db = None,
 ) -> None:
-    """Write a consistent copy of the database to a file; jobs may run meanwhile.
-
-    The file is an SQLite database, also for PostgreSQL.
-    """
+    """Write a consistent copy of an SQLite database to a file; jobs may run meanwhile."""
     from gaitswarm.services.optimizer.store import maintenance
 
     maintenance.backup(_database(db), file, overwrite=force)
@@ -87,8 +84,7 @@ def restore(
 ) -> None:
     """Restore a backup to an empty database that is not in use.
 
-    Backups of older versions are upgraded; backups of SQLite can be restored to PostgreSQL, and
-    vice versa.
+    Backups of older versions are upgraded, and can be restored to PostgreSQL.
     """
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.optimizer.store import maintenance

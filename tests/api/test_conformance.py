@@ -189,6 +189,7 @@ def test_every_operation_of_the_document_is_among_them() -> None:
 
 @pytest.mark.thorough("test_every_answer_is_as_documented, one answer after another")
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_ten_minutes_of_requests_and_sequences_are_answered_as_documented() -> None:
     found = campaign(cases=1000, seed=1, minutes=10.0)
     assert (found.failures, found.tracebacks) == ({}, [])

@@ -19,7 +19,6 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     RobustPreferencesView,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
-from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import TargetsView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
@@ -87,7 +86,7 @@ __all__ = [
     "PreferenceForView", "ProvenanceChanged", "PsoSettings", "QuotaExceeded",
     "RandomSearchSettings", "RankingView", "RecordedWalk", "RobotFiles", "RobotVariant",
     "RobustPreferencesView", "RobustnessOptions", "RobustnessView", "Scenario",
-    "ScenarioFamiliesView", "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
+    "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
     "Variable", "VerificationView", "WalkLog", "__version__", "connect",

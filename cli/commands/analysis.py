@@ -37,10 +37,6 @@ if TYPE_CHECKING:
         RobustPreferencesView,
     )
     from gaitswarm.services.optimizer.analysis.ranking import RankingView
-    from gaitswarm.services.optimizer.analysis.scenario_families import (
-        LossView,
-        ScenarioFamiliesView,
-    )
 
 
 def rank(
@@ -257,55 +253,6 @@ def _failures(view: FailuresView) -> Parts:
         yield table(heads, rows, gap=1)
     recent = "" if view.recent is None else f"; {percent(view.recent, 2)} % of the latest quarter"
     yield f"{view.failed} of {view.designs} designs failed in at least one scenario{recent}"
-
-
-def scenarios(
-    job_id: JobId,
-    tolerance: Annotated[
-        float, typer.Option(help="Largest accepted regret of a subset of scenarios, as a share.")
-    ] = 0.01,
-    *,
-    jobs: Jobs,
-) -> Printed:
-    """Show which scenarios of a job matter, from stored designs, without simulation.
-
-    Compares the job's best with those by subsets of its scenarios. A search with fewer scenarios
-    visits other designs, so confirm the result by a job.
-    """
-    view = jobs.scenarios(job_id, tolerance=tolerance)
-    return view, _families(view)
-
-
-def _families(view: ScenarioFamiliesView) -> Parts:
-    def share(value: float | None) -> str:
-        return "fails" if value is None else f"{100.0 * value:.1f}"
-
-    def shares(loss: LossView) -> str:
-        return f"{share(loss.value)} ({share(loss.low)}–{share(loss.high)})"
-
-    heads = ["scenario", "rank\ncorrelation", "regret\nover all %", "loss\nin it %", "<most like"]
-    without = (
-        (
-            *(left.scenario, number(left.family.correlation, 3)),
-            *(shares(left.family.regret), shares(left.loss)),
-            MISSING if left.similar is None else f"{left.similar}, {left.similarity:.2f}",
-        )
-        for left in view.left_out
-    )
-    yield table(heads, without, title="Left out", gap=1)
-    heads = [">scenarios", "families", "median regret %", "worst %", "within tolerance"]
-    sizes = (
-        (size.size, size.families, share(size.median), share(size.worst), size.within)
-        for size in view.sizes
-    )
-    yield table(heads, sizes, title="Families")
-    smallest, subset = view.smallest, "none"
-    if smallest is not None:
-        subset = f"{', '.join(smallest.scenarios)}; regret {shares(smallest.regret)} %"
-    yield (
-        f"{view.designs} designs walk in all scenarios; smallest family within"
-        f" {100.0 * view.tolerance:g} %: {subset}"
-    )
 
 
 def preferences(

@@ -89,7 +89,6 @@ class AsyncJobs:
     history = _iterated(Jobs.history)
     evaluations = _awaited(Jobs.evaluations)
     ranking = _awaited(Jobs.ranking)
-    scenarios = _awaited(Jobs.scenarios)
     failures = _awaited(Jobs.failures)
     importance = _awaited(Jobs.importance)
     comparison = _awaited(Jobs.comparison)

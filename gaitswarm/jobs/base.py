@@ -77,14 +77,8 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
-from gaitswarm.services.optimizer.analysis.scenario_families import (
-    TOLERANCE,
-    ScenarioFamiliesView,
-    scenario_families,
-)
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.analysis.utilities import (
-    log_utilities,
     objective_vectors,
     require_success,
     tuning_spec,
@@ -689,31 +683,6 @@ class Jobs(ABC):
             )
         request = RankingRequest(preference=preference, top=top)
         return rank(self._service.columns(job), job.spec, request)
-
-    @analysis(
-        "GET /jobs/{job_id}/scenarios", "get_scenario_families", "Get the importance of scenarios"
-    )
-    def scenarios(
-        self,
-        job_id: str,
-        *,
-        tolerance: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = TOLERANCE,
-    ) -> ScenarioFamiliesView:
-        """Determine which scenarios of a job matter, from stored objectives.
-
-        Args:
-            tolerance: Largest regret of the smallest family of scenarios, as a share.
-
-        Raises:
-            Conflict: No design of it succeeds in all scenarios.
-        """
-        spec, columns = self._tuning(job_id, "scenarios")
-        judged = log_utilities(columns, spec.resolved_preference())
-        if spec.worlds is not None:
-            judged = spec.worlds.aggregated(judged)
-        require_success(job_id, judged)
-        names = [scenario.name for scenario in spec.resolved_scenarios()]
-        return scenario_families(columns, judged, names, tolerance=tolerance)
 
     def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
         job = self._service.job(job_id)

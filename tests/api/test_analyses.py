@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.service import JobService
 from tests.api.conftest import Commit, Serve
 
 WHOLE_HISTORIES = {
-    *("get_distribution", "get_particles", "rank_designs", "get_scenario_families", "get_front"),
+    *("get_distribution", "get_particles", "rank_designs", "get_front"),
     *("get_importance", "compare_jobs", "list_convergences"),
     *("get_preference_for", "get_certificate", "get_targets", "get_parameters"),
     "get_evidence",

@@ -56,7 +56,6 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/particles",
         f"post {job}/ranking",
         f"get {job}/failures",
-        f"get {job}/scenarios",
         f"post {job}/preferences",
         f"get {job}/firmware",
         f"get {job}/firmware/summary",

@@ -17,7 +17,6 @@ COMMANDS = [
     "best ID",
     "history ID",
     "importance ID",
-    "scenarios ID",
     "front ID",
     "rank ID --preference A",
     "preferences ID --for 0.0",

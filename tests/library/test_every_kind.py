@@ -143,7 +143,6 @@ def test_every_analysis_answers_for_a_tuning(jobs: DatabaseJobs, tuned: JobView)
     best = jobs.best(tuned.id)
     assert jobs.ranking(tuned.id, "B").evaluations == tuned.evaluations
     assert jobs.importance(tuned.id).designs > 0
-    assert jobs.scenarios(tuned.id).designs > 0
     assert jobs.front(tuned.id).size > 0
     assert jobs.preferences(tuned.id, drawn=8).candidates
     assert jobs.preference_for(tuned.id, best.iteration, best.particle).fits

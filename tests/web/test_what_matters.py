@@ -1,4 +1,4 @@
-"""Required scenarios, and robustness of winners by preference."""
+"""Robustness of winners by preference."""
 
 from __future__ import annotations
 
@@ -7,43 +7,10 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
-
-
-def test_each_scenario_is_left_out_and_the_smallest_set_starts_a_job(
-    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
-) -> None:
-    tolerance = 0.05
-    analysis = server.client.get(
-        f"/v1/jobs/{finished_job}/scenarios", params={"tolerance": tolerance}
-    ).json()
-    smallest = analysis["smallest"]
-    assert smallest is not None
-    page = visit(server.url).go(f"/jobs/{finished_job}/scenarios")
-    part = page.get_by_role("region", name="Required scenarios")
-    part.get_by_label("Tolerated regret").select_option(str(tolerance))
-    expect(part).to_have_attribute("data-smallest", " ".join(smallest["scenarios"]))
-    rows = part.locator("[data-left-out]")
-    expect(rows).to_have_count(len(analysis["left_out"]))
-    for left in analysis["left_out"]:
-        winner = f"design {left['family']['iteration']}.{left['family']['particle']}"
-        expect(part.locator(f"[data-left-out='{left['scenario']}']")).to_contain_text(winner)
-    part.get_by_role("link", name="Start a job with these").click()
-    expect(page.locator("[data-custom]")).to_have_count(len(smallest["scenarios"]))
-
-
-@pytest.mark.thorough("test_each_scenario_is_left_out_and_the_smallest_set_starts_a_job")
-def test_a_job_with_one_scenario_has_an_empty_state(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
-    job_id = server.submit(SMALL_SPEC)
-    server.wait_for(job_id, "succeeded")
-    page = visit(server.url).go(f"/jobs/{job_id}/scenarios")
-    expect(page.get_by_role("heading", name="Only one scenario")).to_be_visible()
 
 
 @pytest.mark.thorough("simulations of all winners' neighbours")

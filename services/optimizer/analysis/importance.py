@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.distribution import thinned
-from gaitswarm.services.optimizer.analysis.statistics import average_ranks, percentile_interval
+from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, average_ranks
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, objective_vectors
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
@@ -246,14 +246,15 @@ def first_order_indices(
     if not rank.any():
         return None
     weights = np.vstack([np.ones(len(rank)), _bootstrap_weights(len(rank))])
+    tail = 0.5 * (1.0 - CONFIDENCE)
     result = []
     for column, variable in enumerate(variables):
         ratios = _corrected_ratio(_classes(designs[:, column], variable), rank, weights)
         # Resamples repeat designs, which increases their ratios: subtract that shift.
         resampled = ratios[1:] - (np.mean(ratios[1:]) - ratios[0])
-        index, *around = np.clip([ratios[0], *resampled], 0.0, 1.0)
-        interval = percentile_interval(float(index), np.array(around))
-        result.append(IndexIntervalView.model_validate(interval))
+        value, *around = np.clip([ratios[0], *resampled], 0.0, 1.0)
+        low, high = np.quantile(around, (tail, 1.0 - tail), method="inverted_cdf")
+        result.append(IndexIntervalView(value=value, low=low, high=high))
     return result
 
 
@@ -305,4 +306,4 @@ def _corrected_ratio(classes: NDArray[np.intp], rank: Floats, weights: Floats) -
         between = np.where(count > 0, sums**2 / count, 0.0).sum(axis=1) - rows * mean**2
         unexplained = np.clip(1.0 - between / total, 0.0, 1.0)
         index = 1.0 - unexplained * (rows - 1) / (rows - present)
-    return np.where((present > 1) & (total > 0.0), index, 0.0)
+    return np.where((present > 1) & (present < rows) & (total > 0.0), index, 0.0)

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.distribution import iteration_starts
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
-from gaitswarm.services.optimizer.analysis.statistics import rank_correlation
+from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, evaluations_of
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -62,7 +62,7 @@ class RankingView(View):
         description="By the requested preference, of the job's own best design [1].",
         examples=[23.1],
     )
-    correlation: float | None = Field(
+    correlation: Finite = Field(
         description="Spearman's rank correlation of both rankings, over the designs in"
         " both [1]; null where it is undefined.",
         examples=[0.83],
@@ -83,11 +83,13 @@ def rank(columns: EvaluationColumns, spec: JobSpec, request: RankingRequest) -> 
     starts = iteration_starts(columns)
     least = np.minimum.reduceat(fitness, starts) if len(starts) else fitness
     best_so_far = np.minimum.accumulate(least).tolist()
+    both = np.isfinite(fitness) & np.isfinite(before)
+    correlation = spearman(fitness[both], before[both]) if both.any() else None
     return RankingView(
         preference=request.preference,
         evaluations=len(columns),
         fitness_of_present_best=float(fitness[present[0]]) if len(present) else None,
-        correlation=rank_correlation(fitness, before),
+        correlation=correlation,
         top=[
             RankedDesignView.model_validate(
                 {

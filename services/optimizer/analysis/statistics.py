@@ -1,9 +1,9 @@
-"""Ranks, correlations and confidence intervals"""
+"""Ranks and their correlation"""
 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 CONFIDENCE: Final = 0.95
-
-
-class Interval(NamedTuple):
-    """An estimate with its interval at the level `CONFIDENCE`."""
-
-    value: float
-    low: float
-    high: float
+"""Level of intervals."""
 
 
 def spearman(first: Floats, second: Floats) -> float:
@@ -34,23 +27,3 @@ def average_ranks(values: Floats) -> Floats:
     _, places, sizes = np.unique(values, return_inverse=True, return_counts=True)
     means = np.cumsum(sizes) - 0.5 * (sizes - 1.0)
     return np.asarray(means[places])
-
-
-def rank_correlation(first: Floats, second: Floats) -> float | None:
-    """Spearman's rank correlation over rows that are finite in both; None if undefined."""
-    both = np.isfinite(first) & np.isfinite(second)
-    if not both.any():
-        return None
-    correlation = spearman(first[both], second[both])
-    return None if math.isnan(correlation) else correlation
-
-
-def percentile_interval(value: float, resampled: Floats) -> Interval:
-    """Interval between two quantiles of (B,) resampled estimates (Efron 1979); NaN is ignored."""
-    defined = resampled[~np.isnan(resampled)]
-    if not len(defined):
-        return Interval(value, math.nan, math.nan)
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    # Without interpolation, as values may be infinite.
-    low, high = np.quantile(defined, (tail, 1.0 - tail), method="inverted_cdf")
-    return Interval(value, float(low), float(high))

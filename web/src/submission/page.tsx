@@ -12,7 +12,7 @@ import { idsOf } from '../router/query-value'
 import { jobPath } from '../router/routes'
 import { around, widened } from './draft/bounds'
 import { type Catalogue, loadCatalogue, variablesOf } from './draft/catalogue'
-import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './draft/draft'
+import { type Draft, draftOf, emptyDraft, preferenceOf } from './draft/draft'
 import { caseOf } from './draft/settings'
 import { FitPage, OtherKinds } from './fit/page'
 import { JobForm } from './form'
@@ -94,8 +94,6 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
   const preference = preferenceOf(preferenceIn(query), catalogue)
   if (preference) draft = { ...draft, preference }
-  const scenarios = query.get('scenarios')?.split(',')
-  if (scenarios) draft = withScenarios(draft, scenarios)
   const widen = query.get('widen')
   if (widen !== null) draft = widened(draft, widen)
   const design = await designIn(query, from.id, signal)

@@ -15,7 +15,6 @@ import { Bars } from '../bars'
 import { caseWords, fitnessUnit } from '../facts'
 import { utilityOf } from '../preference'
 import { type Reference, ReferencePicker, useReference } from '../reference'
-import { ScenarioFamiliesCard } from './families-card'
 import './notes.css'
 
 interface Row {
@@ -81,7 +80,6 @@ export default function ScenariosPanel({ job }: { job: Job }) {
           </dl>
         </details>
       </Card>
-      {job.kind === 'tuning' && <ScenarioFamiliesCard job={job} />}
     </div>
   )
 }

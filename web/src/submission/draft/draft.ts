@@ -154,14 +154,6 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
   }
 }
 
-export function withScenarios(draft: Draft, selected: readonly string[]): Draft {
-  return {
-    ...draft,
-    presets: draft.presets.filter((name) => selected.includes(name)),
-    custom: draft.custom.filter(({ name }) => selected.includes(name)),
-  }
-}
-
 export function scenarioDraft(
   fields: ReadonlyMap<string, SchemaField>,
   start: Scenario | null,

@@ -37,42 +37,24 @@ class Reference:
         return 1.0 - fitness / self.fitness
 
 
-def published_for(spec: Spec) -> tuple[str, Mapping[str, float]] | None:
-    """Return the published design for a job's controller and preference.
-
-    Published designs apply to the shipped robots. Plug-in cases have other measures.
-    """
-    if not isinstance(spec, JobSpec) or spec.case is not None:
-        return None
-    study = published_study(spec)
-    if study is None or isinstance(spec.robot, RobotFiles):
-        return None
-    return study, adapted_to_job(CONTROLLERS[spec.controller].published[study], spec)
-
-
-def start_of(spec: Spec) -> Mapping[str, float] | None:
-    """Return the start design of a job, the middle of its bounds.
-
-    Custom robots have no published design; this one shows the gain of the search.
-    """
-    if not isinstance(spec, JobSpec) or spec.case is not None:
-        return None
-    if not isinstance(spec.robot, RobotFiles):
-        return None
-    space = spec.design_space()
-    middle = space.designs(np.array([(space.low + space.high) / 2.0]))
-    (values,) = space.simulated(middle).tolist()
-    return dict(zip(space.names, values, strict=True))
-
-
 def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
-    """Return the design that a job's best is compared with."""
-    published = published_for(spec)
-    if published is not None:
-        name, design = published
-        return name, "published", design
-    start = start_of(spec)
-    return None if start is None else (START, "start", start)
+    """Return the design that a job's best is compared with.
+
+    Shipped robots have a published one, for the job's controller and preference; of custom robots
+    it is the start design, the middle of the bounds. Plug-in cases have other measures.
+    """
+    if not isinstance(spec, JobSpec) or spec.case is not None:
+        return None
+    if isinstance(spec.robot, RobotFiles):
+        space = spec.design_space()
+        middle = space.designs(np.array([(space.low + space.high) / 2.0]))
+        (values,) = space.simulated(middle).tolist()
+        return START, "start", dict(zip(space.names, values, strict=True))
+    study = published_study(spec)
+    if study is None:
+        return None
+    published = CONTROLLERS[spec.controller].published[study]
+    return study, "published", adapted_to_job(published, spec)
 
 
 def published_study(spec: JobSpec) -> str | None:

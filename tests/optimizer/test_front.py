@@ -165,8 +165,9 @@ def test_hypervolume_grows_iteration_by_iteration_in_the_box_of_the_whole() -> N
     # Objectives without a range are at the ideal, and the box reaches a tenth beyond.
     squares = [(side - 3.0) ** 2, (side - 2.0) ** 2, (side - 2.0) ** 2 + 2.0 * 2.0 * last]
     volumes = [iteration.hypervolume for iteration in front.iterations]
-    np.testing.assert_allclose(volumes, np.array(squares) / side**2)
-    assert (front.hypervolume, front.hypervolume_error) == (volumes[-1], 0.0)
+    np.testing.assert_allclose(volumes, np.array(squares) / side**2, atol=0.008)
+    assert front.hypervolume == volumes[-1]
+    assert 0.0 < front.hypervolume_error < 0.002
 
 
 def test_in_worlds_an_objective_is_what_the_job_makes_of_it_in_all_of_them() -> None:

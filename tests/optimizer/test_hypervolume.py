@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.front import hypervolume_curve
 
+LARGEST_ERROR = 0.008
+"""Five standard deviations of a half, estimated from 100 000 points."""
+
 
 def by_inclusion_and_exclusion(points: np.ndarray) -> float:
     """Volume of a union of boxes [point, 1)."""
@@ -42,8 +45,8 @@ def sphere(count: int, seed: int) -> np.ndarray:
 )
 def test_known_volumes(points: list[list[float]], volumes: list[float]) -> None:
     curve, error = hypervolume_curve(np.array(points))
-    np.testing.assert_allclose(curve, volumes, atol=1e-15)
-    assert error == 0.0
+    np.testing.assert_allclose(curve, volumes, atol=LARGEST_ERROR)
+    assert error == pytest.approx(np.sqrt(curve[-1] * (1.0 - curve[-1]) / 100_000))
 
 
 @given(
@@ -52,7 +55,7 @@ def test_known_volumes(points: list[list[float]], volumes: list[float]) -> None:
     objectives=st.integers(1, 6),
     values=st.sampled_from([3, 5, 10_000]),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_it_is_the_volume_of_the_union_after_each_point(
     seed: int, count: int, objectives: int, values: int
 ) -> None:
@@ -60,7 +63,7 @@ def test_it_is_the_volume_of_the_union_after_each_point(
     drawn = np.random.default_rng(seed).integers(0, values + 1, (count, objectives))
     points = drawn / values
     expected = [by_inclusion_and_exclusion(points[:k]) for k in range(1, count + 1)]
-    np.testing.assert_allclose(hypervolume_curve(points)[0], expected, atol=1e-12)
+    np.testing.assert_allclose(hypervolume_curve(points)[0], expected, atol=LARGEST_ERROR)
 
 
 @pytest.mark.thorough("test_it_is_the_volume_of_the_union_after_each_point")
@@ -74,17 +77,9 @@ def test_a_front_of_hundreds_agrees_with_points_drawn_at_random() -> None:
     assert hypervolume_curve(points)[0][-1] == pytest.approx(dominated.mean(), abs=5.0 * error)
 
 
-def test_an_estimate_has_an_error_and_agrees_with_the_exact_curve() -> None:
-    points = sphere(200, seed=5)
-    exact, none = hypervolume_curve(points)
-    estimate, error = hypervolume_curve(points, most_bounds=100)
-    assert none == 0.0
-    assert 0.0 < error < 0.002
-    np.testing.assert_allclose(estimate, exact, atol=5.0 * error)
-    assert (np.diff(estimate) >= 0.0).all() and (np.diff(exact) >= 0.0).all()
-
-
-def test_the_order_of_points_does_not_matter_to_the_whole() -> None:
+def test_it_never_falls_and_the_order_of_points_does_not_matter_to_the_whole() -> None:
     points = sphere(100, seed=6)
-    (forwards, _), (backwards, _) = hypervolume_curve(points), hypervolume_curve(points[::-1])
-    assert forwards[-1] == pytest.approx(backwards[-1], rel=1e-12)
+    (forwards, error), (backwards, _) = hypervolume_curve(points), hypervolume_curve(points[::-1])
+    assert 0.0 < error < 0.002
+    assert (np.diff(forwards) >= 0.0).all()
+    assert forwards[-1] == backwards[-1]

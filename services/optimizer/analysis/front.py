@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 import numpy as np
@@ -63,14 +62,10 @@ def _no_worse(judges: Floats, points: Floats) -> NDArray[np.intp]:
     return np.asarray(result.sum(axis=0))
 
 
-MOST_BOUNDS: Final = 250_000
-"""Number of local upper bounds up to which a hypervolume is computed exactly."""
-
 _MOST_SAMPLES: Final = 100_000
-"""Limit on the sample size of an estimate."""
 
 _COMPARISONS: Final = 1_000_000_000
-"""Limit on compared pairs of an estimate: more points reduce the sample."""
+"""Limit on compared pairs: more points reduce the sample."""
 
 _DRAW: Final = 0xA7EA
 
@@ -78,113 +73,12 @@ _AT_ONCE: Final = 4_000_000
 """Comparisons held in memory at a time."""
 
 
-def hypervolume_curve(points: Floats, *, most_bounds: int = MOST_BOUNDS) -> tuple[Floats, float]:
-    """Return the (n,) hypervolumes after each of (n, M) points, minimized, in their order.
+def hypervolume_curve(points: Floats) -> tuple[Floats, float]:
+    """Estimate the (n,) hypervolumes after each of (n, M) points, minimized, in their order.
 
-    With the standard error of the last one: 0 if they are exact.
-
-    The box is the unit box with the reference point at 1; values below 0 count as 0.
+    With the standard error of the last one. The box is the unit box with the reference point at 1;
+    values below 0 count as 0.
     """
-    clipped = np.maximum(points, 0.0)
-    exact = _exact(clipped, most_bounds)
-    return _estimated(clipped) if exact is None else (exact, 0.0)
-
-
-def _exact(points: Floats, most_bounds: int) -> Floats | None:
-    """(n,) values; None beyond the limit on bounds."""
-    undominated = _Undominated.of(points)
-    values = np.empty(len(points))
-    for row in range(len(points)):
-        undominated.insert(row)
-        if undominated.count > most_bounds:
-            return None
-        values[row] = undominated.volume
-    return np.maximum.accumulate(np.clip(1.0 - values, 0.0, 1.0))
-
-
-@dataclass(slots=True, eq=False)
-class _Undominated:
-    """The part of the unit box that no point dominates, as a union of [0, bound).
-
-    A bound's coordinate j is that of the point defining[j], or 1 where that is -1; the point is
-    below the bound in all other coordinates. Of equal coordinates the later point's counts as
-    greater, so that no two are equal.
-
-    points: (n, M); bounds: (M, room), used up to `count`; defining: (M, room) rows of points;
-    volumes: (room,) of the disjoint boxes; volume: their sum.
-    """
-
-    points: Floats
-    bounds: Floats
-    defining: Rows
-    volumes: Floats
-    count: int
-    volume: float
-
-    @classmethod
-    def of(cls, points: Floats) -> _Undominated:
-        size = points.shape[1]
-        return cls(
-            # The last row belongs to -1: the sides of the box.
-            np.vstack([points, np.zeros(size)]),
-            np.ones((size, 1024)),
-            np.full((size, 1024), -1, dtype=np.intp),
-            np.ones(1024),
-            count=1,
-            volume=1.0,
-        )
-
-    def insert(self, row: int) -> None:
-        point, size = self.points[row], self.points.shape[1]
-        above = self.bounds[0, : self.count] > point[0]
-        for j in range(1, size):
-            above &= self.bounds[j, : self.count] > point[j]
-        split = np.flatnonzero(above)
-        if not len(split):
-            return
-        bounds, defining = self.bounds[:, split], self.defining[:, split]
-        new_bounds, new_defining = [], []
-        for j in range(size):
-            others = self.points[np.delete(defining, j, axis=0), j]
-            selected = point[j] >= others.max(axis=0, initial=0.0)
-            new = bounds[:, selected]
-            new[j] = point[j]
-            by = defining[:, selected]
-            by[j] = row
-            new_bounds.append(new)
-            new_defining.append(by)
-        self._replace(split, np.concatenate(new_bounds, 1), np.concatenate(new_defining, 1))
-
-    def _replace(self, old: Rows, bounds: Floats, defining: Rows) -> None:
-        volumes = self._volumes(bounds, defining)
-        self.volume += math.fsum(volumes) - math.fsum(self.volumes[old])
-        added = max(0, len(volumes) - len(old))
-        self._reserve(self.count + added)
-        places = np.concatenate([old, np.arange(self.count, self.count + added)])
-        places, empty = places[: len(volumes)], places[len(volumes) :]
-        self.bounds[:, places], self.defining[:, places] = bounds, defining
-        self.volumes[places] = volumes
-        # No point is below these.
-        self.bounds[:, empty], self.volumes[empty] = 0.0, 0.0
-        self.count += added
-
-    def _volumes(self, bounds: Floats, defining: Rows) -> Floats:
-        """Volumes of the boxes: in coordinate j, above the points that define earlier ones."""
-        volumes: Floats = bounds[0].copy()
-        for j in range(1, len(bounds)):
-            volumes *= np.maximum(bounds[j] - self.points[defining[:j], j].max(axis=0), 0.0)
-        return volumes
-
-    def _reserve(self, count: int) -> None:
-        room = self.bounds.shape[1]
-        if count > room:
-            more = max(count, 2 * room) - room
-            self.bounds = np.pad(self.bounds, ((0, 0), (0, more)))
-            self.defining = np.pad(self.defining, ((0, 0), (0, more)))
-            self.volumes = np.pad(self.volumes, (0, more))
-
-
-def _estimated(points: Floats) -> tuple[Floats, float]:
     size = points.shape[1]
     samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
     left = RandomNumbers(0, _DRAW).uniform(samples, size)
@@ -323,7 +217,7 @@ class FrontView(View):
         examples=[0.63],
     )
     hypervolume_error: float = Field(
-        description="Its standard error [1]: 0 if exact; fronts of thousands may be sampled."
+        description="Its standard error [1]: it is estimated from random points."
     )
     iterations: list[FrontIterationView] = Field(
         description="Hypervolume by iteration, in the same box; it never falls."

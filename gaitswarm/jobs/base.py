@@ -353,9 +353,8 @@ class Jobs(ABC):
     ) -> EstimateView:
         """Check a job as on submission, and estimate its cost. Nothing is stored.
 
-        The time follows from the rate of earlier jobs with the same robot and controller; if there
-        are none, a short simulation is timed on the server, which may have to compile the robot's
-        kernel.
+        The time follows from a short simulation on the server, which may have to compile the
+        robot's kernel.
 
         Args:
             spec: As for `submit`.

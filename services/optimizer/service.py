@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -42,9 +42,6 @@ from gaitswarm.sim.identification import RecordedWalk
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
-
-_RECENT_JOBS: Final = 50
-"""Newest jobs among which the estimate looks for similar ones."""
 
 
 class JobService:
@@ -142,13 +139,10 @@ class JobService:
         return self.store.recordings([recording_id])[recording_id]
 
     def estimate(self, spec: Spec) -> Estimate:
-        """Estimate a job's cost from similar jobs or a measured simulation."""
+        """Estimate a job's cost from a measured simulation."""
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
-        others = [job for job in self.store.jobs(limit=_RECENT_JOBS).items if job.readable]
-        return estimate(
-            with_start_designs(spec, self.job, self.columns), cases, others, self._rates
-        )
+        return estimate(with_start_designs(spec, self.job, self.columns), cases, self._rates)
 
     def job(self, job_id: str) -> Job:
         return self.store.job(job_id)

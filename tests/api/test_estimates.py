@@ -5,10 +5,7 @@ from __future__ import annotations
 import httpx2
 import pytest
 
-from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store
-from tests.api.conftest import Commit
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.walks import SHORT_WALK
 
@@ -24,16 +21,6 @@ def test_an_estimate_counts_walks_and_stores_nothing(client: httpx2.Client, stor
     assert found["seconds"] > 0.0
     assert "measured" in found["basis"]
     assert store.jobs().items == ()
-
-
-def test_earlier_jobs_tell_the_rate(
-    client: httpx2.Client, job: Job, commit: Commit, spec: JobSpec
-) -> None:
-    commit(job, 2)
-    found = client.post("/v1/estimates", json=spec.model_dump(mode="json")).json()
-    # Two iterations took a second together, and the same job has three.
-    assert found["seconds"] == pytest.approx(1.5)
-    assert "1 earlier job" in found["basis"]
 
 
 @pytest.mark.parametrize(

@@ -98,9 +98,6 @@ def _by_pace(job: Job, now: datetime) -> tuple[float, str]:
     return max(0.0, remaining - min(one_iteration, since)), basis
 
 
-_MOST_JOBS: Final = 5
-"""Jobs whose rates are averaged, so that no single job on a busy machine decides."""
-
 _MEASURED: Final = 8
 """Designs simulated to measure a rate: a multiple of every kernel's lanes."""
 
@@ -124,25 +121,13 @@ class Estimate:
     basis: str  # what the wall time is derived from, for people
 
 
-def estimate(
-    spec: Spec, cases: Sequence[Case], earlier: Sequence[Job], measured: MeasuredRates
-) -> Estimate:
-    """Estimate a job from the rate of similar jobs, else from a short simulation in this thread."""
-    evaluations = spec.budget
-    one = duration(spec, cases)
-    positions = spec.create_search().ask()
-    similar = [job for job in earlier if _is_similar(job, spec, len(positions))][:_MOST_JOBS]
-    if similar:
-        walked = sum(_simulated_seconds(job, one) for job in similar)
-        rate: float | None = walked / sum(job.progress.compute_seconds for job in similar)
-        jobs = "1 earlier job" if len(similar) == 1 else f"{len(similar)} earlier jobs"
-        basis = f"the rate of {jobs} with similar simulations: {rate:.3g} simulated s/s"
-    else:
-        rate, basis = measured.rate(spec, cases, positions)
-    simulated = evaluations * one
+def estimate(spec: Spec, cases: Sequence[Case], measured: MeasuredRates) -> Estimate:
+    """Estimate a job from the rate of a short simulation in this thread."""
+    rate, basis = measured.rate(spec, cases, spec.create_search().ask())
+    simulated = spec.budget * duration(spec, cases)
     return Estimate(
-        evaluations=evaluations,
-        walks=evaluations * len(cases),
+        evaluations=spec.budget,
+        walks=spec.budget * len(cases),
         simulated_seconds=simulated,
         seconds=None if rate is None else simulated / rate,
         basis=basis,
@@ -246,22 +231,6 @@ def _shortened(case: Case) -> Case:
     return replace(case, scenario=scenario.model_copy(update={"cycles": cycles}))
 
 
-def _is_similar(job: Job, spec: Spec, asked: int) -> bool:
-    """Whether a job has run similar simulations, in iterations of a similar size.
-
-    asked: designs in the spec's first iteration; a few at once take longer each than many.
-    """
-    progress = job.progress
-    return (
-        progress.compute_seconds > 0.0
-        and progress.evaluations_walked > 0
-        and min(_MEASURED, round(progress.evaluations / progress.iterations))
-        == min(_MEASURED, asked)
-        and _kind_of_walk(job.spec) == _kind_of_walk(spec)
-        and job.spec.recording_ids == spec.recording_ids
-    )
-
-
 def _kind_of_walk(spec: Spec) -> str:
     """Determinants of a simulation's speed: robot, controller, precision, case."""
     if isinstance(spec, CertificateSpec):
@@ -271,15 +240,6 @@ def _kind_of_walk(spec: Spec) -> str:
     fitted = "recorded" if spec.recording_ids else "calibrated"
     controller = spec.controller if isinstance(spec, JobSpec) else fitted
     return f"{controller} {spec.model_dump_json(include={'robot', 'precision', 'case'})}"
-
-
-def _simulated_seconds(job: Job, fitted: float) -> float:
-    """Return the simulated time of a similar job's committed iterations [s].
-
-    fitted: simulated time of one design of the new job [s]; fits to the same recordings share it.
-    """
-    one = fitted if job.spec.recording_ids else duration(job.spec, job.spec.cases({}))
-    return job.progress.evaluations_walked * one
 
 
 def _typical(space: DesignSpace, name: str) -> float | None:

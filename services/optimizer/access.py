@@ -34,18 +34,12 @@ class Scope(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A token as stored, without its secret.
+    """A token as stored, without its secret."""
 
-    Attributes:
-        name: chosen by its creator; the owner of jobs submitted with it.
-        created_at: UTC.
-        revoked_at: UTC; None while the token is valid.
-    """
-
-    name: str
+    name: str  # chosen by its creator; the owner of jobs submitted with it
     scope: Scope
-    created_at: datetime
-    revoked_at: datetime | None = None
+    created_at: datetime  # UTC
+    revoked_at: datetime | None = None  # UTC; None while the token is valid
 
     def may_command(self, owner: str | None) -> bool:
         """Return whether the token may control jobs of an owner."""

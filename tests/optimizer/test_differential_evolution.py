@@ -68,7 +68,7 @@ def test_a_member_is_replaced_by_a_trial_that_is_no_worse_and_by_no_other() -> N
     fitness = np.array([0.5, 1.0, 1.5, math.inf, 0.9] * 2)
     optimizer.tell(fitness)
     expected = np.where((fitness <= 1.0)[:, np.newaxis], trials, first)
-    np.testing.assert_array_equal(optimizer.population, expected)
+    np.testing.assert_array_equal(optimizer.state.members, expected)
 
 
 def test_the_population_falls_evenly_over_the_budget_and_then_stays() -> None:
@@ -76,7 +76,7 @@ def test_the_population_falls_evenly_over_the_budget_and_then_stays() -> None:
     sizes = {}
     while optimizer.evaluations < 700:
         generation(optimizer)
-        sizes[optimizer.evaluations] = len(optimizer.population)
+        sizes[optimizer.evaluations] = len(optimizer.state.members)
     for evaluations, size in sizes.items():
         assert abs(size - max(4.0, 24.0 - 20.0 * evaluations / 600)) <= 0.5
 
@@ -85,9 +85,9 @@ def test_the_worst_members_are_removed() -> None:
     optimizer = search(budget=40, population=20, population_end=4)
     first = optimizer.ask()
     optimizer.tell(np.arange(20.0))
-    np.testing.assert_array_equal(optimizer.population, first[:12])
+    np.testing.assert_array_equal(optimizer.state.members, first[:12])
     optimizer.tell(np.full(len(optimizer.ask()), math.inf))
-    np.testing.assert_array_equal(optimizer.population, first[:7])
+    np.testing.assert_array_equal(optimizer.state.members, first[:7])
 
 
 def test_no_trial_is_a_design_that_the_population_has() -> None:
@@ -95,7 +95,7 @@ def test_no_trial_is_a_design_that_the_population_has() -> None:
     generation(optimizer)
     new = total = 0
     for _ in range(30):
-        have = {row.tobytes() for row in GRID.designs(optimizer.population)}
+        have = {row.tobytes() for row in GRID.designs(optimizer.state.members)}
         trials = {row.tobytes() for row in GRID.designs(generation(optimizer))}
         new, total = new + len(trials - have), total + len(have)
     # One draw in ten gives a variable the value that it had.
@@ -152,7 +152,7 @@ def test_a_categorical_variable_takes_every_choice_and_settles_on_the_best() -> 
             np.array([3.0, 5.0, 0.0, 5.0, 4.0])[designs[:, 0].astype(int)] + designs[:, 1]
         )
     assert set(seen[:100]) == {0.0, 1.0, 2.0, 3.0, 4.0}
-    assert set(space.designs(optimizer.population)[:, 0]) == {2.0}
+    assert set(space.designs(optimizer.state.members)[:, 0]) == {2.0}
 
 
 def test_the_population_never_grows() -> None:

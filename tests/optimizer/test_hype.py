@@ -112,7 +112,7 @@ def test_whole_fronts_stay_as_long_as_there_is_room_and_failures_last() -> None:
     optimizer.tell(np.array([[1.0, 2.0], [math.inf, math.inf], [2.0, 1.0], [3.0, 3.0]]))
     second = optimizer.ask()
     optimizer.tell(np.array([[4.0, 4.0], [0.9, 5.0], [math.inf, 0.0], [5.0, 5.0]]))
-    positions, vectors = optimizer.population
+    positions, vectors = optimizer.state.members, optimizer.state.vectors
     assert positions.tolist() == [*first[[0, 2, 3]].tolist(), second[1].tolist()]
     assert vectors.tolist() == [[1.0, 2.0], [2.0, 1.0], [3.0, 3.0], [0.9, 5.0]]
 
@@ -136,7 +136,7 @@ def test_the_first_members_are_the_start_and_more_than_there_is_room_for_are_sel
     feedback = np.column_stack([np.abs(positions[:, 0] - 0.25), np.full(10, 1.0)])
     feedback[7:] = [[9.0, 0.5], [8.0, 0.7], [7.0, 0.8]]
     optimizer.tell(feedback)
-    assert optimizer.population[0].tolist() == start[[2, 7, 8, 9]].tolist()
+    assert optimizer.state.members.tolist() == start[[2, 7, 8, 9]].tolist()
 
 
 def test_designs_at_bounds_are_tried() -> None:

@@ -13,7 +13,6 @@ by that preference.
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -44,7 +43,7 @@ from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
 from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
-from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging, stored_state
 
 Floats = NDArray[np.float64]
 
@@ -151,18 +150,12 @@ _OUTCOMES_HOLD: Final = frozenset({"preference", "optimizer"})
 
 @dataclass(frozen=True, slots=True)
 class Parent:
-    """The parent of a fork, and its iterations before the fork.
-
-    Attributes:
-        columns: evaluations of these iterations.
-        positions: reads the (n, d) positions of each of them.
-        digest: of the last of them; None if it is not chained.
-    """
+    """The parent of a fork, and its iterations before the fork."""
 
     job: Job
-    columns: EvaluationColumns
-    positions: Callable[[], tuple[Floats, ...]]
-    digest: str | None = None
+    columns: EvaluationColumns  # evaluations of these iterations
+    positions: Callable[[], tuple[Floats, ...]]  # reads the (n, d) positions of each of them
+    digest: str | None = None  # of the last of them; None if it is not chained
 
     def by_iteration(self, column: Floats) -> tuple[Floats, ...]:
         """Split a column by iteration."""
@@ -283,27 +276,21 @@ def _search_state(
     )
     budgets = budgets_of(parent.job)
     if rejudged is None:
-        return _dumped(retraced(spec, budgets, positions, feedback, until=until))
+        return stored_state(retraced(spec, budgets, positions, feedback, until=until))
     rejudged_feedback = parent.feedback(spec, rejudged)
     try:
         # Any method that would have asked for the same positions can continue.
-        return _dumped(retraced(spec, budgets, positions, rejudged_feedback, until=until))
+        return stored_state(retraced(spec, budgets, positions, rejudged_feedback, until=until))
     except ValueError:
         search = retraced(spec, budgets, positions, feedback, until=until)
     name = spec.optimizer.name
     if isinstance(search, Rejudging):
         search.rejudge(list(zip(positions[:-1], rejudged_feedback[:-1], strict=True)))
-        return _dumped(search)
+        return stored_state(search)
     raise ValueError(
         f"{name} would have asked for other designs by this preference, and cannot learn from"
         " the parent's"
     )
-
-
-def _dumped(search: Optimizer) -> dict[str, Any]:
-    """The dump as the store will return it."""
-    stored: dict[str, Any] = json.loads(json.dumps(search.dump(), allow_nan=False))
-    return stored
 
 
 def _check_budget(spec: AnySpec, evaluations: int) -> None:

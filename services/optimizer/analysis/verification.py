@@ -57,20 +57,13 @@ class BrokenChain(Exception):
 
 @dataclass(slots=True)
 class Chain:
-    """A chain being recomputed, iteration by iteration.
-
-    Attributes:
-        spec: for explanations; None if unreadable.
-        iterations: number verified.
-        head: digest of the last; None before the first.
-        places: index of each digest.
-    """
+    """A chain being recomputed, iteration by iteration."""
 
     documents: ChainDocuments
-    spec: AnySpec | None
-    iterations: int = 0
-    head: str | None = None
-    places: dict[str, int] = field(default_factory=dict)
+    spec: AnySpec | None  # for explanations; None if unreadable
+    iterations: int = 0  # number verified
+    head: str | None = None  # digest of the last; None before the first
+    places: dict[str, int] = field(default_factory=dict)  # index of each digest
 
     def extend(
         self, link: Link, columns: EvaluationColumns, reevaluation: Reevaluation | None
@@ -95,23 +88,14 @@ class Chain:
 
 @dataclass(frozen=True, slots=True)
 class HistoryCheck:
-    """Result of verifying a job's history.
+    """Result of verifying a job's history."""
 
-    Attributes:
-        iterations: number of intact iterations, from the first.
-        head: digest of the last of them; None if there is none.
-        broken_at: first damaged iteration; None if all are intact.
-        problem: description of the damage, for people; empty if intact.
-        head_found_at: iteration with the requested digest; None if there is none.
-        sizes: number of designs of each intact iteration.
-    """
-
-    iterations: int
-    head: str | None
-    broken_at: int | None = None
-    problem: str = ""
-    head_found_at: int | None = None
-    sizes: tuple[int, ...] = ()
+    iterations: int  # number of intact iterations, from the first
+    head: str | None  # digest of the last of them; None if there is none
+    broken_at: int | None = None  # first damaged iteration; None if all are intact
+    problem: str = ""  # description of the damage, for people; empty if intact
+    head_found_at: int | None = None  # iteration with the requested digest; None if there is none
+    sizes: tuple[int, ...] = ()  # number of designs of each intact iteration
 
 
 def check_history(store: Store, job: Job, *, head: str | None = None) -> HistoryCheck:

@@ -39,7 +39,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from hashlib import blake2b
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +56,7 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.jobs.spec import Spec, judge_outcomes
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.outage import Backoff
-from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, stored_state
 from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.provenance import Provenance
@@ -397,13 +397,7 @@ def _ask(spec: Spec, optimizer: Optimizer) -> Ask | None:
     if left <= 0:
         return None
     positions = optimizer.ask(left)
-    return Ask(optimizer.iteration, positions, _as_stored(optimizer.dump()))
-
-
-def _as_stored(state: dict[str, Any]) -> dict[str, Any]:
-    """The state as the store will return it; raises at once if JSON cannot represent it."""
-    stored: dict[str, Any] = json.loads(json.dumps(state, allow_nan=False))
-    return stored
+    return Ask(optimizer.iteration, positions, stored_state(optimizer))
 
 
 def _done(state: Coordination) -> CompletedIteration:

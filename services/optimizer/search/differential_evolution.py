@@ -115,11 +115,6 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
     def first_size(self) -> int:
         return self.settings.population
 
-    @property
-    def population(self) -> Floats:
-        """(n, d) positions of the members, (0, d) before their first generation is evaluated."""
-        return self.state.members.copy()
-
     def begin(self) -> None:
         settings, state, d = self.settings, self.state, self.space.dimension
         state.began = state.evaluations

@@ -88,11 +88,6 @@ class Hype(Generational[HypeSettings, _PopulationState]):
     def first_size(self) -> int:
         return self.settings.population
 
-    @property
-    def population(self) -> tuple[Floats, Floats]:
-        """(n, d) positions and (n, M) objective vectors of the members; empty at first."""
-        return self.state.members.copy(), self.state.vectors.copy()
-
     def begin(self) -> None:
         state = self.state
         state.members, state.vectors = np.empty((0, self.space.dimension)), np.empty((0, 0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
@@ -117,6 +118,12 @@ class Rejudging(Optimizer, Protocol):
         generations: (n, d) positions and (n,) fitness, +inf for a failed evaluation, of all
         evaluations, in order. Raises ValueError if some are missing or a generation is incomplete.
         """
+
+
+def stored_state(search: Optimizer) -> dict[str, Any]:
+    """Return the dump as the store will return it; raise at once if JSON cannot represent it."""
+    stored: dict[str, Any] = json.loads(json.dumps(search.dump(), allow_nan=False))
+    return stored
 
 
 def checked_fitness(fitness: Floats, asked: int, objectives: int | None = None) -> Floats:

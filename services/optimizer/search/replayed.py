@@ -130,7 +130,7 @@ class Replayed(Stateful[_FeedbackState]):
 
     def dump(self) -> dict[str, Any]:
         if self._course is not None:
-            _COURSES.put(self._key(), self._course)
+            _cache(self._key(), self._course)
             self._course = None
         return super().dump()
 
@@ -149,7 +149,7 @@ class Replayed(Stateful[_FeedbackState]):
 
     def _running(self) -> _Course:
         if self._course is None:
-            self._course = _COURSES.take(self._key()) or self._replay()
+            self._course = _cached(self._key()) or self._replay()
         return self._course
 
     def _replay(self) -> _Course:
@@ -172,27 +172,23 @@ class Replayed(Stateful[_FeedbackState]):
         return blake2b(key, digest_size=16).digest()
 
 
-class _CourseCache:
-    """Courses by search and feedback; drops the least recently cached ones."""
-
-    def __init__(self) -> None:
-        self._courses: OrderedDict[bytes, _Course] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def put(self, key: bytes, course: _Course) -> None:
-        with self._lock:
-            self._courses[key] = course
-            self._courses.move_to_end(key)
-            while len(self._courses) > _CACHED:
-                self._courses.popitem(last=False)
-
-    def take(self, key: bytes) -> _Course | None:
-        """Remove and return a course, so that it has one user at a time."""
-        with self._lock:
-            return self._courses.pop(key, None)
+_COURSES: Final = OrderedDict[bytes, _Course]()
+_LOCK: Final = threading.Lock()
 
 
-_COURSES: Final = _CourseCache()
+def _cache(key: bytes, course: _Course) -> None:
+    """Cache a course by search and feedback; drop the least recently cached ones."""
+    with _LOCK:
+        _COURSES[key] = course
+        _COURSES.move_to_end(key)
+        while len(_COURSES) > _CACHED:
+            _COURSES.popitem(last=False)
+
+
+def _cached(key: bytes) -> _Course | None:
+    """Remove and return a course, so that it has one user at a time."""
+    with _LOCK:
+        return _COURSES.pop(key, None)
 
 
 def _after(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Final, Literal, Self, TypeAlias
 
 import numpy as np
@@ -27,7 +28,7 @@ from gaitswarm.services.optimizer.jobs.preference import (
 from gaitswarm.services.optimizer.jobs.spec import Spec, requested
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.case import Case, Walk
-from gaitswarm.sim.case_registry import CASES, CaseFamily, CaseSettings, create_case
+from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
@@ -110,10 +111,6 @@ def _case_settings(choice: object) -> object:
     return choice
 
 
-def _model(family: CaseFamily) -> type[CaseSettings]:
-    return family.settings
-
-
 class _OrName:
     """Allows a case's name in place of its settings, in schemas."""
 
@@ -131,7 +128,10 @@ if TYPE_CHECKING:
     CaseChoice: TypeAlias = CaseSettings | None
 else:
     CaseChoice = Annotated[
-        None, PluginSettings(CASES, _model, "/v1/cases"), BeforeValidator(_case_settings), _OrName()
+        None,
+        PluginSettings(CASES, attrgetter("settings"), "/v1/cases"),
+        BeforeValidator(_case_settings),
+        _OrName(),
     ]
 """Choice of a case; validation replaces a name by settings."""
 

@@ -59,14 +59,12 @@ from gaitswarm.views.catalogue import (
     CatalogueView,
     ControllerView,
     OptimizerView,
-    PluginView,
     PreferenceView,
     RobotView,
     ScenarioView,
     case_views,
     controller_views,
     optimizers,
-    plugin_views,
     preference_views,
     robot_views,
     scenario_views,
@@ -335,11 +333,6 @@ class ServedJobs(DatabaseJobs):
     def list_cases(self) -> CatalogueView[CaseView]:
         """Return cases of installed plug-ins, which evaluate designs in place of the simulator."""
         return CatalogueView(items=case_views())
-
-    @robots("GET /plugins", "list_plugins", "List plug-ins")
-    def list_plugins(self) -> CatalogueView[PluginView]:
-        """Return controllers, cases and search methods that installed packages add."""
-        return CatalogueView(items=plugin_views())
 
     @robots("POST /robots/drafts", "draft_robot", "Draft a robot from a URDF", heavy=True)
     def draft_robot(self, request: RobotDraftRequest) -> RobotDraftView:

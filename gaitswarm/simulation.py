@@ -32,7 +32,7 @@ from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput, checked
 from gaitswarm.tables import Table
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 Floats = NDArray[np.float64]
 
@@ -137,10 +137,6 @@ class SimulationResult:
         for name, values in zip(self.variables, self.designs.T, strict=True):
             columns[f"design.{name}"] = np.repeat(values, k)
         return Table(columns)
-
-    def to_pandas(self) -> pd.DataFrame:
-        """`table()` as a data frame. Raises ImportError without pandas."""
-        return self.table().to_pandas()
 
 
 LOG_RATE: Final = 500

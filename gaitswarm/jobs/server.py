@@ -239,11 +239,10 @@ class ServerJobs(Jobs):
                     return response
                 response.read()
                 response.close()
+                outcome: httpx2.Response | httpx2.HTTPError = response
             except httpx2.HTTPError as error:
-                seconds = attempts.after_failure(error)
-            else:
-                seconds = attempts.after_refusal(response)
-            time.sleep(seconds)
+                outcome = error
+            time.sleep(attempts.after(outcome))
 
 
 def _event(sent: httpx2.ServerSentEvent) -> JobEvent | None:
@@ -302,32 +301,23 @@ class Attempts:
         self._repeatable = repeatable
         self._failures = 0
 
-    def after_failure(self, error: httpx2.HTTPError) -> float:
-        """Return the time until the next attempt [s]; raise StoreUnavailable if there is none."""
-        again = self._repeatable and isinstance(error, _TRANSIENT)
-        seconds = self._wait(0.0, again=again)
-        if seconds is None:
-            raise unreachable(self._url, error) from error
-        return seconds
-
-    def after_refusal(self, response: httpx2.Response) -> float:
-        """Return the time until the next attempt [s]; raise the server's error if there is none."""
-        busy = response.status_code == HTTPStatus.TOO_MANY_REQUESTS
-        again = busy or (
-            self._repeatable and response.status_code == HTTPStatus.SERVICE_UNAVAILABLE
-        )
-        seconds = self._wait(_retry_after(response), again=again)
-        if seconds is None:
-            raise error_of(response)
-        return seconds
-
-    def _wait(self, at_least: float, *, again: bool) -> float | None:
+    def after(self, outcome: httpx2.Response | httpx2.HTTPError) -> float:
+        """Return the time until the next attempt [s]; raise the error if there is none."""
         self._failures += 1
+        if isinstance(outcome, httpx2.Response):
+            at_least, code = _retry_after(outcome), outcome.status_code
+            again = code == HTTPStatus.TOO_MANY_REQUESTS or (
+                self._repeatable and code == HTTPStatus.SERVICE_UNAVAILABLE
+            )
+        else:
+            at_least, again = 0.0, self._repeatable and isinstance(outcome, _TRANSIENT)
         delay = self._backoff.delay(self._failures) if again else None
         # A server that wants a longer pause than allowed gets no further attempt.
-        if delay is None or at_least > self._backoff.longest:
-            return None
-        return max(delay, at_least)
+        if delay is not None and at_least <= self._backoff.longest:
+            return max(delay, at_least)
+        if isinstance(outcome, httpx2.Response):
+            raise error_of(outcome)
+        raise unreachable(self._url, outcome) from outcome
 
 
 def unreachable(url: str, error: Exception) -> StoreUnavailable:

@@ -88,7 +88,6 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/optimizers",
         "get /v1/controllers",
         "get /v1/cases",
-        "get /v1/plugins",
         "post /v1/controllers/{controller}/surface",
         "get /v1/audit",
         "get /v1/session",

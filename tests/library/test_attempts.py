@@ -44,39 +44,39 @@ def attempts(*, repeatable: bool = True) -> Attempts:
 
 def test_waits_grow_and_end() -> None:
     tried = attempts()
-    assert [tried.after_failure(httpx2.ConnectError("refused")) for _ in range(3)] == [1, 2, 4]
+    assert [tried.after(httpx2.ConnectError("refused")) for _ in range(3)] == [1, 2, 4]
     with pytest.raises(gaitswarm.StoreUnavailable, match="refused"):
-        tried.after_failure(httpx2.ConnectError("refused"))
+        tried.after(httpx2.ConnectError("refused"))
 
 
 @pytest.mark.parametrize("error", LOST)
 def test_a_lost_connection_is_made_again_for_what_may_be_repeated(error: type) -> None:
-    assert attempts().after_failure(error("lost")) == 1.0
+    assert attempts().after(error("lost")) == 1.0
     with pytest.raises(gaitswarm.StoreUnavailable, match=URL):
-        attempts(repeatable=False).after_failure(error("lost"))
+        attempts(repeatable=False).after(error("lost"))
 
 
 @pytest.mark.parametrize("error", [httpx2.ReadTimeout, httpx2.UnsupportedProtocol])
 def test_any_other_failure_is_final(error: type) -> None:
     with pytest.raises(gaitswarm.StoreUnavailable):
-        attempts().after_failure(error("no"))
+        attempts().after(error("no"))
 
 
 def test_a_busy_server_is_asked_again_when_it_wants_to_be() -> None:
-    assert attempts().after_refusal(refusal(503)) == 1.0
-    assert attempts().after_refusal(refusal(503, **{"Retry-After": "7"})) == 7.0
-    assert attempts().after_refusal(refusal(503, **{"Retry-After": "0"})) == 1.0
-    assert attempts().after_refusal(refusal(503, **{"Retry-After": "soon"})) == 1.0
+    assert attempts().after(refusal(503)) == 1.0
+    assert attempts().after(refusal(503, **{"Retry-After": "7"})) == 7.0
+    assert attempts().after(refusal(503, **{"Retry-After": "0"})) == 1.0
+    assert attempts().after(refusal(503, **{"Retry-After": "soon"})) == 1.0
 
 
 def test_a_server_that_wants_more_patience_than_there_is_is_not_asked_again() -> None:
     with pytest.raises(gaitswarm.StoreUnavailable, match="too fast"):
-        attempts().after_refusal(refusal(503, **{"Retry-After": "3600"}))
+        attempts().after(refusal(503, **{"Retry-After": "3600"}))
 
 
 def test_a_command_to_a_busy_server_is_not_repeated() -> None:
     with pytest.raises(gaitswarm.StoreUnavailable):
-        attempts(repeatable=False).after_refusal(refusal(503))
+        attempts(repeatable=False).after(refusal(503))
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_every_other_refusal_is_final_and_becomes_the_error_that_the_server_had(
     status: int, kind: str, error: type[gaitswarm.GaitswarmError]
 ) -> None:
     with pytest.raises(error, match=r"^speed: too fast$") as raised:
-        attempts().after_refusal(refusal(status, kind))
+        attempts().after(refusal(status, kind))
     assert type(raised.value) is error
     if isinstance(raised.value, gaitswarm.InvalidRequest):
         assert raised.value.field == "speed"

@@ -46,8 +46,8 @@ from gaitswarm.cli.output import (
 _GROUPS: Final = {
     "robot": ("Create a robot from a URDF file, and check it.", (robot.init, robot.check)),
     "plot": (
-        "Draw a job's convergence or front, a controller's surface, or designs' robustness.",
-        (plot.convergence, plot.front, plot.surface, plot.robustness),
+        "Draw a job's convergence or front, or a controller's surface.",
+        (plot.convergence, plot.front, plot.surface),
     ),
     "token": (
         "Create, list and revoke tokens for access to a server.",

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from gaitswarm.cli.files import replacing
 from gaitswarm.cli.output import note
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
     from gaitswarm.robots import RobotCheckView
-    from gaitswarm.robustness_index import RobustnessView
     from gaitswarm.services.optimizer.analysis.front import FrontView, NormalisedDesignView
     from gaitswarm.services.optimizer.analysis.identifiability import (
         IdentifiabilityView,
@@ -109,47 +106,6 @@ def draw_surface(surface: Surface, *, title: str) -> Figure:
     return figure
 
 
-def draw_robustness(views: Mapping[str, RobustnessView], *, title: str) -> Figure:
-    """Draw the index with its interval by scenario, designs side by side (after fig. 4.8).
-
-    views: of the same scenarios, by label.
-    """
-    scenarios = list(next(iter(views.values())).scenarios)
-    heights, errors = {}, {}
-    for label, view in views.items():
-        indices = [*(view.scenarios[name].index for name in scenarios), view.index]
-        value, low, high = (
-            np.array(_floats([getattr(index, bound, None) for index in indices]))
-            for bound in ("value", "low", "high")
-        )
-        heights[label] = value
-        errors[label] = [value - low, high - value]
-    figure = _figure(8.0, 3.8)
-    axes = figure.add_subplot()
-    _draw_bars(axes, [*scenarios, "all"], heights, errors)
-    axes.set_ylabel("robustness index  [1]")
-    figure.suptitle(title, x=0.02, ha="left", weight="bold")
-    axes.legend(ncols=len(views), loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    return figure
-
-
-def _draw_bars(
-    axes: Axes,
-    groups: Sequence[str],
-    heights: Mapping[str, ArrayLike],
-    errors: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw bars by label side by side in each group; NaN has no bar."""
-    width = 0.8 / len(heights)
-    style = {"elinewidth": 1.0, "capsize": 2.0}
-    for k, (label, values) in enumerate(heights.items()):
-        places = np.arange(len(groups)) + (k - (len(heights) - 1) / 2) * width
-        error = None if errors is None else errors[label]
-        axes.bar(places, values, width, yerr=error, error_kw=style, label=label)
-    axes.set_xticks(range(len(groups)), groups, rotation=20, ha="right")
-    axes.grid(visible=False, axis="x")
-
-
 def save(figure: Figure, path: Path, option: str = "output") -> None:
     """Write a figure in the format of the file's suffix; option: the one that named the path."""
     kind = path.suffix.removeprefix(".").lower()
@@ -160,10 +116,6 @@ def save(figure: Figure, path: Path, option: str = "output") -> None:
     with replacing(path, option) as file:
         figure.savefig(file, format=kind, dpi=150, metadata=metadata)
     note(f"picture written to {path}")
-
-
-def _floats(values: Sequence[float | None]) -> list[float]:
-    return [math.nan if value is None else value for value in values]
 
 
 _ACROSS: Final = {"from the side": (0, 2), "from above": (0, 1)}

@@ -1,4 +1,4 @@
-"""`gaitswarm plot`: pictures of convergence, fronts, controllers and robustness."""
+"""`gaitswarm plot`: pictures of convergence, fronts and controllers."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gaitswarm.cli.commands.designs import SampleOptions, estimate
 from gaitswarm.cli.options import JobId, Place
-from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.robustness_index import RobustnessRequest
 
 Output = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.png, .svg or .pdf.")
@@ -59,30 +56,3 @@ def surface(
     (inference,) = CONTROLLERS["fuzzy-pi"].inferences(given.values)
     drawn = surface_of(inference, error_points=129, current_points=65)
     save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
-
-
-def robustness(
-    designs: Annotated[
-        list[str], typer.Argument(metavar="DESIGN|ID", help="Designs as for `robustness`.")
-    ],
-    output: Output,
-    options: SampleOptions,
-    title: Annotated[str, typer.Option(help="Title of the picture.")] = "Robustness",
-    *,
-    place: Place,
-) -> None:
-    """Draw robustness indices of designs by scenario, with their intervals."""
-    from gaitswarm.cli.inputs import given_design
-    from gaitswarm.cli.pictures import draw_robustness, save
-
-    requests: dict[str, RobustnessRequest] = {}
-    for design in designs:
-        given = given_design(design, options.controller, robot=options.robot, place=place)
-        label = f"{given.label} ({design})" if given.label in requests else given.label
-        requests[label] = options.request(given)
-    if len({request.resolved_scenarios() for request in requests.values()}) > 1:
-        raise InvalidRequest(
-            "the designs' jobs have different scenarios; pass --scenarios", field="scenarios"
-        )
-    views = {label: estimate(request) for label, request in requests.items()}
-    save(draw_robustness(views, title=title), output)

@@ -87,23 +87,9 @@ def target() -> Target:
 def cpu_flags() -> frozenset[str]:
     """Return the flags of this machine's x86-64 CPU, as far as the system reports them."""
     try:
-        if platform.system() == "Darwin":
-            return _flags_of_macos(subprocess.check_output(_SYSCTL, text=True, timeout=10.0))
         return frozenset(Path("/proc/cpuinfo").read_text(encoding="utf-8").split())
-    except (OSError, subprocess.SubprocessError):
+    except OSError:
         return frozenset()
-
-
-_SYSCTL: Final = (
-    *("/usr/sbin/sysctl", "-n"),
-    *("machdep.cpu.features", "machdep.cpu.leaf7_features"),
-)
-
-
-def _flags_of_macos(text: str) -> frozenset[str]:
-    """Convert to Linux's names: `SSE4.1` is `sse4_1`, and `sse3` is `pni`."""
-    flags = frozenset(text.lower().replace(".", "_").split())
-    return flags | {"pni"} if "sse3" in flags else flags
 
 
 # No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on

@@ -58,7 +58,6 @@ COMMANDS = {
     "pause": "ID",
     "plot convergence": "ID --output FILE.svg",
     "plot front": "ID --output FILE.svg",
-    "plot robustness": "ID --samples 45 --output FILE.svg",
     "plot surface": "--design job:ID --output FILE.svg",
     "preferences": "ID --for 0.0 --json",
     "prioritize": "ID --priority 1",

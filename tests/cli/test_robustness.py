@@ -1,8 +1,6 @@
-"""`gaitswarm robustness` and `plot robustness`."""
+"""`gaitswarm robustness`."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import pytest
 
@@ -73,21 +71,3 @@ def test_invalid_input_is_named(gaitswarm: Gaitswarm, options: tuple[str, str], 
 
 def test_an_unknown_job_is_exit_code_3(gaitswarm: Gaitswarm, finished: Finished) -> None:
     assert gaitswarm("robustness", "nowhere", "--db", finished.db).code == 3
-
-
-@pytest.mark.thorough("test_a_published_design_has_an_index_by_scenario_objective_and_variable")
-def test_designs_are_drawn_side_by_side(
-    gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
-) -> None:
-    picture = tmp_path / "robustness.svg"
-    result = gaitswarm(
-        "plot", "robustness", "published:A", finished.id, f"job:{finished.id}", "--samples", 40,
-        "--scenarios", "normal-fast", "--db", finished.db, "--output", picture,
-    )  # fmt: skip
-    assert result.code == 0, result.err
-    assert "<svg" in picture.read_text(encoding="utf-8")
-    refused = gaitswarm(
-        "plot", "robustness", "published:A", finished.id, "--db", finished.db, "--output", picture
-    )
-    assert refused.code == 2
-    assert "scenarios: the designs' jobs have different scenarios" in refused.err

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import platform
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,10 +26,6 @@ from tests.sim.processes import run_python
 V2 = "fpu sse2 pni ssse3 cx16 sse4_1 sse4_2 popcnt"
 V3 = f"{V2} fma movbe f16c bmi1 avx2 bmi2"
 V4 = f"{V3} avx512f avx512dq avx512cd avx512bw avx512vl"
-INTEL_MAC = (
-    "FPU SSE2 SSE3 SSSE3 FMA CX16 SSE4.1 SSE4.2 MOVBE POPCNT AVX1.0 F16C\n"
-    "RDWRFSGS BMI1 AVX2 BMI2 AVX512F AVX512DQ AVX512CD AVX512BW AVX512VL\n"
-)
 
 
 @pytest.fixture(autouse=True)
@@ -83,26 +78,13 @@ def test_an_unknown_architecture_gets_baseline_code(monkeypatch: pytest.MonkeyPa
     assert target() == Target(2, "", "riscv64")
 
 
-def test_macos_reports_the_flags_of_an_intel_mac(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend(monkeypatch, "Darwin", "x86_64")
-    asked: list[str] = []
-
-    def sysctl(command: list[str], **_: object) -> str:
-        asked.extend(command)
-        return INTEL_MAC
-
-    monkeypatch.setattr(subprocess, "check_output", sysctl)
-    assert target() == Target(8, "x86-64-v4", X86)
-    assert asked[0] == "/usr/sbin/sysctl"
-
-
 def test_an_unknown_cpu_gets_baseline_code(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend(monkeypatch, "Darwin", "x86_64")
 
-    def sysctl(*_: object, **__: object) -> str:
-        raise subprocess.CalledProcessError(1, "sysctl")
+    def read_text(*_: object, **__: object) -> str:
+        raise FileNotFoundError("/proc/cpuinfo")
 
-    monkeypatch.setattr(subprocess, "check_output", sysctl)
+    monkeypatch.setattr(Path, "read_text", read_text)
     assert cpu_flags() == frozenset()
     assert target() == Target(2, "", X86)
 

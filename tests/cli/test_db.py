@@ -29,7 +29,7 @@ def test_commands_refuse_a_database_of_another_schema(gaitswarm: Gaitswarm, db: 
     for command in (("list",), ("db", "upgrade")):
         refused = gaitswarm(*command, "--db", db)
         assert refused.code == ExitCode.UNAVAILABLE
-        assert "revision 0019 of a version before 0.1.0" in refused.err
+        assert "revision 0019, which this gaitswarm" in refused.err
 
 
 def test_a_missing_database_is_not_created(gaitswarm: Gaitswarm, db: Path) -> None:
@@ -60,7 +60,7 @@ def test_a_check_reports_findings_and_fails(gaitswarm: Gaitswarm, db: Path) -> N
     store_job_without_iterations(db)
     broken = gaitswarm("db", "check", "--db", db, "--json")
     assert broken.code == ExitCode.JOB_FAILED
-    assert any("counts 3 iterations, but has 0" in finding for finding in broken.json)
+    assert any("iteration 0: it is missing" in finding for finding in broken.json)
 
 
 def store_job_without_iterations(db: Path) -> None:

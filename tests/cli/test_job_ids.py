@@ -65,7 +65,6 @@ COMMANDS = {
     "record": "MEASURED --design job:ID --scenario 1 --cycles 2",
     "resume": "ID",
     "robustness": "ID --samples 45 --json",
-    "scenarios": "ID --json",
     "simulate": "--design job:ID --json",
     "status": "ID --json",
     "submit": "--start-from ID,ID --json",

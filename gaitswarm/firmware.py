@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Final, TypedDict, Unpack
+from typing import TypedDict, Unpack
 
 from pydantic import Field
 
 from gaitswarm.designs import ScenariosRequest
 from gaitswarm.errors import simulation_errors
-from gaitswarm.robots import replaced_folder
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.robots import check_new, new_folder
 from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.controllers import ControllerName
-from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.firmware.folder import (
-    FORMAT,
-    MANIFEST,
     Firmware,
     check_drives_by_pwm,
     check_table_bits,
@@ -29,20 +24,15 @@ from gaitswarm.sim.firmware.microcontroller import BUDGET
 from gaitswarm.sim.input import Line
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
 
-_BUILT: Final = "build"
-"""Build folder of the folder's Makefile."""
-
 
 class FirmwareOptions(TypedDict, total=False):
     """Fields of a `FirmwareRequest` as keywords.
 
     Attributes:
         scenarios: One scenario or several, whose trajectories are written and whose walks are
-            repeated: names or numbers of presets, or `Scenario`; default those of the job, of other
-            designs the six of table 4.2.
-        controller: Motor controller that drives the robot; default that of the job, or fuzzy-pi.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another; default that of
-            the job, or the default robot.
+            repeated: names or numbers of presets, or `Scenario`; default the six of table 4.2.
+        controller: Motor controller that drives the robot; default fuzzy-pi.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
         label: Display name of the design.
         table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
             place of 10 and 6, where there is less flash.
@@ -109,8 +99,7 @@ class FirmwareTrajectoryView(View):
     """Desired angles in a scenario."""
 
     scenario: str = Field(description="Name of the scenario.", examples=["normal-fast"])
-    sample_rate: float = Field(description="Rows a second [Hz].", examples=[500.0])
-    rows: int = Field(description="Rows of the table.", examples=[755])
+    rows: int = Field(description="Rows of the table, 500 a second.", examples=[755])
     columns: int = Field(description="Angles of a row; joints that move alike share one.")
     repeats_from: int | None = Field(
         description="Row that follows the last one; null if the trajectory does not repeat."
@@ -156,9 +145,6 @@ class FirmwareView(View):
     files: dict[str, int] = Field(
         description="Size of every file [B].", examples=[{"tick.c": 4600}]
     )
-    integer_bits: int = Field(
-        description="Width of the numbers with 16 fraction bits, 32 or 64 [bit].", examples=[32]
-    )
     tables: list[FirmwareTableView] = Field(description="Fuzzy tables; none for P, PI, PID.")
     table_difference: dict[str, Finite] | None = Field(
         description="By objective, largest relative difference from simulations with the table of"
@@ -182,7 +168,6 @@ def firmware_view(
         controller=request.controller,
         design=request.numbers,
         files={name: len(content) for name, content in firmware.files.items()},
-        integer_bits=firmware.law.fine_bits,
         tables=[
             FirmwareTableView(name=name, shape=list(part.values.shape), bytes=part.values.nbytes)
             for name, part in parts.items()
@@ -192,7 +177,6 @@ def firmware_view(
         trajectories=[
             FirmwareTrajectoryView(
                 scenario=table.name,
-                sample_rate=1.0 / CONTROL_PERIOD,
                 rows=len(table.rows),
                 columns=table.rows.shape[1],
                 repeats_from=table.repeats_from if table.repeats else None,
@@ -239,7 +223,7 @@ def write_firmware(
     Args:
         design: Value of each of the controller's variables, and of any gait variable, in their
             units.
-        output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
+        output: New or empty folder, which is written as a whole or not at all.
         **options: Robot, controller, scenarios and tables, see `FirmwareOptions`. With other
             `table_bits` than the default's, the difference of simulations is reported.
 
@@ -248,50 +232,16 @@ def write_firmware(
 
     Raises:
         InvalidRequest: An argument is invalid, a gait leaves the legs' reach, or the folder
-            holds anything but firmware or cannot be written; names the argument.
+            is not empty or cannot be written; names the argument.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
     request = checked(FirmwareRequest, {"design": design, **options})
-    check_replaceable(output)
-    firmware = run_firmware(request)
-    write_folder(output, firmware.files)
-    return firmware_view(request, firmware, str(output))
-
-
-def check_replaceable(output: str | os.PathLike[str]) -> None:
-    """Check that a folder is missing, empty, or holds firmware and its build output."""
     folder = Path(output)
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise InvalidRequest(f"{folder} is a file; name a folder", field="output")
-    found = {
-        path.relative_to(folder).as_posix()
-        for path in folder.rglob("*")
-        if not path.is_dir() and path.relative_to(folder).parts[0] != _BUILT
-    }
-    foreign = sorted(found - _written_files(folder))
-    if foreign:
-        raise InvalidRequest(
-            f"{folder} holds files that are no firmware, such as {foreign[0]}; name another folder",
-            field="output",
-        )
-
-
-def write_folder(output: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing its contents."""
-    with replaced_folder(Path(output)) as new:
-        for name, content in files.items():
+    check_new(folder)
+    firmware = run_firmware(request)
+    with new_folder(folder) as new:
+        for name, content in firmware.files.items():
             path = new / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
-
-
-def _written_files(folder: Path) -> set[str]:
-    try:
-        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        if manifest["format"] == FORMAT:
-            return set(manifest["files"])
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    return set()
+    return firmware_view(request, firmware, str(folder))

@@ -25,7 +25,7 @@ from gaitswarm.jobs.operation import (
     operations,
     robots,
 )
-from gaitswarm.meshes import MeshFileView, MeshLibrary
+from gaitswarm.meshes import MeshFileView, mesh_content, mesh_views
 from gaitswarm.recordings import (
     MeasuredWalkRequest,
     MeasuredWalkView,
@@ -350,10 +350,10 @@ class ServedJobs(DatabaseJobs):
         """Load a robot and let it stand for a second with all joints held, as `gaitswarm robot
         check`.
 
-        Returns masses, reach, loads of the soles, and warnings about implausible bodies. Meshes are
-        not looked up, so `meshes` is empty. Nothing is stored.
+        Returns masses, reach, loads of the soles, and warnings about implausible bodies. Nothing is
+        stored.
         """
-        return checked_robot(robot, folder=None, field="")
+        return checked_robot(robot, field="")
 
     @robots("GET /robots/{digest}/meshes", "list_meshes", "List the meshes of a robot", page=True)
     def list_meshes(self, digest: str) -> CatalogueView[MeshFileView]:
@@ -362,10 +362,7 @@ class ServedJobs(DatabaseJobs):
         Empty for a robot that is in none of the folders of GAITSWARM_ROBOTS. Simulations need no
         meshes.
         """
-        meshes = MeshLibrary(self._context.robots).of(digest)
-        return CatalogueView(
-            items=[MeshFileView.from_mesh(digest, k, mesh) for k, mesh in enumerate(meshes)]
-        )
+        return CatalogueView(items=mesh_views(self._context.robots, digest))
 
     @robots(
         "GET /robots/{digest}/meshes/{number}", "get_mesh", "Get a mesh", page=True, cached=True
@@ -373,13 +370,13 @@ class ServedJobs(DatabaseJobs):
     def get_mesh(self, digest: str, number: int) -> bytes:
         """Return the file of a mesh, with the ETag of its content.
 
-        Only files of at most 32 MiB that the robot's URDF names, in the robot's folder or in the
-        package that the URDF names.
+        Only files of at most 32 MiB that the robot's URDF names, in the robot's folder, where
+        `gaitswarm robot init` copies them.
 
         Returns:
             The file, in the format given by the list.
         """
-        return MeshLibrary(self._context.robots).content(digest, number)
+        return mesh_content(self._context.robots, digest, number)
 
     @robots(
         "POST /measured-walks",

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.meshes import FoundMesh, MeshCopies, copy_meshes, found_mesh, mesh_names
+from gaitswarm.meshes import copy_meshes, found_mesh, mesh_places
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
@@ -143,15 +143,6 @@ class StandingStillView(View):
     height: float = Field(description="Of the body's origin over the ground at the end [m].")
 
 
-class MeshView(View):
-    """A mesh that the URDF names, for display only."""
-
-    name: str = Field(
-        description="As the URDF has it.", examples=["package://a1_description/meshes/hip.dae"]
-    )
-    path: Path | None = Field(description="File that was found; null for none.")
-
-
 class RobotCheckView(View):
     """A loaded robot and how it stands."""
 
@@ -167,7 +158,6 @@ class RobotCheckView(View):
         description="In the body's frame when it stands [m]."
     )
     standing: StandingStillView = Field(description="How it stands.")
-    meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
     guesses: list[str] = Field(
         description="Guesses of `robot init` that are still in robot.toml, one sentence each."
     )
@@ -189,13 +179,7 @@ _OFF: Final = 0.02
 """Share of the weight by which standing forces may be off before that is a warning."""
 
 
-def check_robot(
-    files: RobotFiles,
-    *,
-    folder: str | os.PathLike[str] | None = ".",
-    packages: Sequence[str | os.PathLike[str]] = (),
-    field: str = "folder",
-) -> RobotCheckView:
+def check_robot(files: RobotFiles, *, field: str = "folder") -> RobotCheckView:
     """Load a robot, let it stand, and look for what is unphysical."""
     with simulation_errors(field):
         robot = load_robot(files)
@@ -209,10 +193,6 @@ def check_robot(
     points = leg_points(robot, angles)
     mass = feet_and_centre_of_mass(robot, angles[None, :], 0.0)[1][0]
     carried = {joint.name: joint.child for joint in robot.urdf.joints}
-    meshes: list[FoundMesh] = []
-    if folder is not None:
-        places = [Path(package) for package in packages]
-        meshes = [found_mesh(name, Path(folder), places) for name in mesh_names(files.urdf)]
     return RobotCheckView(
         name=robot.description.name,
         mass=robot.mass,
@@ -236,7 +216,6 @@ def check_robot(
         held=dict(robot.description.held_joints),
         centre_of_mass=mass.tolist(),
         standing=standing,
-        meshes=[MeshView(name=mesh.name, path=mesh.path) for mesh in meshes],
         guesses=list(robot.description.guesses),
         warnings=[*warnings, *unphysical(robot.urdf, files.urdf)],
     )
@@ -302,13 +281,13 @@ def _standing(robot: Robot, stood: Simulation) -> tuple[StandingStillView, list[
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
 
-@dataclass(frozen=True, slots=True)
-class MadeRobot:
+class MadeRobot(NamedTuple):
     """A robot's folder that was written."""
 
     name: str  # of the robot
     guesses: tuple[str, ...]  # what to check, one sentence each
-    meshes: MeshCopies
+    copied: list[str]  # meshes, as the URDF has them
+    left_out: dict[str, str]  # other meshes, each with the reason
 
 
 def init_robot(
@@ -328,10 +307,7 @@ def init_robot(
     What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.
     """
     source, folder = Path(urdf), Path(output)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InvalidRequest(
-            f"{folder} exists and is not empty; name another folder", field="output"
-        )
+    check_new(folder)
     text = read_text(source, field="urdf", most=LONGEST_URDF + 1)
     chosen = (own_name(text) or source.stem) if name is None else name
     check_name(chosen)
@@ -339,7 +315,7 @@ def init_robot(
     places = [Path(package) for package in packages]
 
     def bounds(mesh: str) -> NDArray[np.float64] | None:
-        path = found_mesh(mesh, source.parent, places).path
+        path = found_mesh(mesh, mesh_places(mesh, source.parent, places)).path
         return None if path is None else mesh_bounds(path)
 
     try:
@@ -350,13 +326,13 @@ def init_robot(
     with simulation_errors("urdf"):
         job = json.dumps(proposal.job, indent=2) + "\n"
         texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
-        copies = MeshCopies()
-        with replaced_folder(folder) as made:
+        copied, left_out = list[str](), dict[str, str]()
+        with new_folder(folder) as made:
             for path, content in texts.items():
                 (made / path).write_text(content, encoding="utf-8")
             if meshes:
-                copies = copy_meshes(proposal.urdf, source.parent, made, places)
-    return MadeRobot(chosen, proposal.notes, copies)
+                copied, left_out = copy_meshes(proposal.urdf, source.parent, made, places)
+    return MadeRobot(chosen, proposal.notes, copied, left_out)
 
 
 def read_text(path: Path, *, field: str, most: int = -1) -> str:
@@ -405,26 +381,27 @@ def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
     return frame
 
 
+def check_new(folder: Path) -> None:
+    """Check that a folder is missing or empty."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InvalidRequest(
+            f"{folder} exists and is not empty; name another folder", field="output"
+        )
+
+
 @contextmanager
-def replaced_folder(folder: Path) -> Iterator[Path]:
-    """A temporary folder that replaces the other one unless an exception is raised."""
+def new_folder(folder: Path) -> Iterator[Path]:
+    """A temporary folder that becomes the other one unless an exception is raised."""
     try:
         target = folder.resolve()
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(
             dir=target.parent, prefix=f".{target.name}.", ignore_cleanup_errors=True
         ) as scratch:
-            new, old = Path(scratch) / "new", Path(scratch) / "old"
+            new = Path(scratch) / "new"
             new.mkdir()
             yield new
-            if target.exists():
-                target.rename(old)
-            try:
-                new.rename(target)
-            except OSError:
-                if old.exists():
-                    old.rename(target)
-                raise
+            new.replace(target)
     except OSError as error:
         raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error
 

@@ -15,7 +15,6 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from gaitswarm.gaits import GaitsView, GaitView
-    from gaitswarm.meshes import MeshCopies
     from gaitswarm.robots import MadeRobot, RobotCheckView
     from gaitswarm.sim.robot import RobotFiles
 
@@ -25,14 +24,6 @@ _LISTED: Final = 5
 Folder = Annotated[
     Path,
     typer.Argument(metavar="FOLDER", help="Folder of robot.toml and robot.urdf.", exists=False),
-]
-
-PackagePath = Annotated[
-    list[Path] | None,
-    typer.Option(
-        metavar="FOLDER",
-        help="Search path of package:// meshes, before ROS_PACKAGE_PATH; repeatable.",
-    ),
 ]
 
 
@@ -76,7 +67,13 @@ def init(
             help="Copy the URDF's meshes, which the page shows; simulations do not need them.",
         ),
     ] = True,
-    package_path: PackagePath = None,
+    package_path: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Search path of package:// meshes, before ROS_PACKAGE_PATH; repeatable.",
+        ),
+    ] = None,
 ) -> Printed:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
 
@@ -97,12 +94,12 @@ def init(
         meshes=meshes,
         packages=package_path or [],
     )
-    left_out = [{"name": name, "problem": problem} for name, problem in created.meshes.left_out]
+    left_out = [{"name": name, "problem": why} for name, why in created.left_out.items()]
     document = {
         "folder": str(output),
         "name": created.name,
         "guesses": list(created.guesses),
-        "meshes": {"copied": list(created.meshes.copied), "left_out": left_out},
+        "meshes": {"copied": created.copied, "left_out": left_out},
     }
     return document, _created(created, output)
 
@@ -110,11 +107,11 @@ def init(
 def _created(created: MadeRobot, folder: Path) -> Iterator[str]:
     for guess in created.guesses:
         yield f"{guess}\n"
-    yield _mesh_summary(created.meshes)
+    yield _mesh_summary(created.copied, created.left_out)
     note(
         f"robot {created.name!r} written to {folder}; check it by `gaitswarm robot check {folder}`"
     )
-    if created.meshes.copied:
+    if created.copied:
         note(f"`gaitswarm serve --robots {folder}` shows its meshes on the page")
 
 
@@ -125,12 +122,11 @@ def check(
         Path | None,
         typer.Option(metavar="FILE", help="Draw its stance to FILE.png, .svg or .pdf."),
     ] = None,
-    package_path: PackagePath = None,
 ) -> Printed:
     """Load a robot, simulate it standing for a second, and show its properties."""
     from gaitswarm.robots import check_robot
 
-    view = check_robot(_files(folder), folder=folder, packages=package_path or [])
+    view = check_robot(_files(folder))
     if draw is not None:
         from gaitswarm.cli.pictures import draw_robot, save
 
@@ -144,14 +140,13 @@ def _checked(view: RobotCheckView) -> Iterator[str]:
         note(f"warning: {warning}")
 
 
-def _mesh_summary(meshes: MeshCopies) -> str:
-    copied, missing = len(meshes.copied), meshes.left_out
-    if not copied and not missing:
+def _mesh_summary(copied: list[str], left_out: dict[str, str]) -> str:
+    if not copied and not left_out:
         return ""
-    lines = [f"meshes: {copied} of {copied + len(missing)} copied, {meshes.size / 1e6:.1f} MB"]
-    lines += [f"  left out: {name[:200]}: {problem}" for name, problem in missing[:_LISTED]]
-    if len(missing) > _LISTED:
-        lines.append(f"  and {len(missing) - _LISTED} more; pass --package-path")
+    lines = [f"meshes: {len(copied)} of {len(copied) + len(left_out)} copied"]
+    lines += [f"  left out: {name[:200]}: {why}" for name, why in list(left_out.items())[:_LISTED]]
+    if len(left_out) > _LISTED:
+        lines.append(f"  and {len(left_out) - _LISTED} more; pass --package-path")
     return "\n".join(lines) + "\n"
 
 
@@ -190,14 +185,6 @@ def _summary(view: RobotCheckView) -> str:
     lines += [f"held: {name} at {angle:g} rad" for name, angle in view.held.items()]
     if view.guesses:
         lines += ["guesses in robot.toml:", *(f"  {guess}" for guess in view.guesses)]
-    if view.meshes:
-        missing = [mesh.name for mesh in view.meshes if mesh.path is None]
-        lines.append(f"meshes: {len(view.meshes) - len(missing)} of {len(view.meshes)} found")
-        lines += [f"  missing: {name}" for name in missing[:_LISTED]]
-        if len(missing) > _LISTED:
-            lines.append(
-                f"  and {len(missing) - _LISTED} more; pass their folders by --package-path"
-            )
     return "\n".join(lines) + "\n"
 
 

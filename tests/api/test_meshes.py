@@ -42,8 +42,9 @@ def folder(tmp_path: Path) -> Path:
     urdf = with_mesh((QUADRUPED / "robot.urdf").read_text(encoding="utf-8"), *NAMES)
     (folder / "robot.urdf").write_text(urdf, encoding="utf-8")
     (folder / "robot.toml").write_text(SECRET, encoding="utf-8")
-    for name in ("body.stl", "leg.STL"):
-        (folder / "meshes" / name).write_bytes(tetrahedron(0.1))
+    (folder / "quadruped_description" / "meshes").mkdir(parents=True)
+    for name in ("meshes/body.stl", "quadruped_description/meshes/leg.STL"):
+        (folder / name).write_bytes(tetrahedron(0.1))
     for place in (folder.parent, tmp_path):
         (place / "secret.stl").write_text(SECRET, encoding="utf-8")
     (folder / "linked.stl").symlink_to(folder.parent / "secret.stl")
@@ -80,7 +81,7 @@ def test_files_that_the_urdf_names_are_given_out_with_a_tag_of_their_content(
         tag = {"If-None-Match": answer.headers["etag"]}
         same = server.client.get(url, headers=tag)
         assert (same.status_code, same.content) == (304, b"")
-    (folder / "meshes" / "leg.STL").write_bytes(tetrahedron(0.2))
+    (folder / "quadruped_description" / "meshes" / "leg.STL").write_bytes(tetrahedron(0.2))
     assert server.client.get(url, headers=tag).content == tetrahedron(0.2)
 
 
@@ -91,8 +92,8 @@ def test_files_outside_of_the_robots_folder_are_never_given_out(
     found = listed(server, digest)
     assert list(found) == list(NAMES)
     said = {
-        "../secret.stl": "outside",
-        "package://quadruped_description/../secret.stl": "outside",
+        "../secret.stl": "not found",
+        "package://quadruped_description/../secret.stl": "not found",
         "package://../secret.stl": "not found",
         "linked.stl": "outside",
         "large.obj": "MiB",

@@ -9,7 +9,7 @@ import pytest
 
 from gaitswarm import meshes
 from gaitswarm.cli.main import run
-from gaitswarm.meshes import MeshLibrary, copy_meshes, own_place, urdf_digest
+from gaitswarm.meshes import copy_meshes, mesh_content, own_place, served_meshes, urdf_digest
 from tests.robots.test_proposal import dog
 
 
@@ -52,9 +52,8 @@ def test_the_folder_shows_its_meshes_wherever_it_goes(
     moved = output.rename(tmp_path / "elsewhere" / "moved")
     (tmp_path / "ros").rename(tmp_path / "gone")
     digest = urdf_digest((moved / "robot.urdf").read_text(encoding="utf-8"))
-    library = MeshLibrary([moved])
-    assert [mesh.name for mesh in library.of(digest) if mesh.path] == list(contents)
-    assert [library.content(digest, n).decode() for n in range(4)] == list(contents)
+    assert [mesh.name for mesh in served_meshes([moved], digest) if mesh.path] == list(contents)
+    assert [mesh_content([moved], digest, n).decode() for n in range(4)] == list(contents)
 
     urdf = tmp_path / "gone" / "dog_description" / "robots" / "dog.urdf"
     assert run(["robot", "init", str(urdf), "--no-meshes", "-o", str(output)]) == 0
@@ -67,18 +66,15 @@ def test_what_is_too_large_or_in_anothers_place_is_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, output = tmp_path / "urdf", tmp_path / "made"
-    sizes = {"a.stl": 6, "b.stl": 11, "../a.stl": 6, "c.stl": 5, "d.stl": 4}
+    sizes = {"a.stl": 6, "b.stl": 11, "../a.stl": 6, "d.stl": 4}
     folder.mkdir()
     for name, size in sizes.items():
         (folder / name).write_bytes(b"x" * size)
     monkeypatch.setattr(meshes, "LARGEST_MESH", 10)
-    monkeypatch.setattr(meshes, "LARGEST_COPY", 10)
-    made = copy_meshes(named(*sizes, "a.stl"), folder, output)
-    assert made.copied == ("a.stl", "d.stl") and made.size == 10
-    why = dict(made.left_out)
-    assert why["b.stl"] == meshes.TOO_LARGE
-    assert "a.stl in the folder" in why["../a.stl"]
-    assert why["c.stl"].startswith("all have more than")
+    copied, left_out = copy_meshes(named(*sizes, "a.stl"), folder, output)
+    assert copied == ["a.stl", "d.stl"]
+    assert left_out["b.stl"].endswith("MiB; simplify it")
+    assert "a.stl in the folder" in left_out["../a.stl"]
     assert sorted(p.name for p in output.iterdir()) == ["a.stl", "d.stl"]
 
 

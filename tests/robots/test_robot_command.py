@@ -151,44 +151,6 @@ def test_check_prints_legs_and_centre_of_mass(
         np.testing.assert_allclose(found["points"][3], foot, atol=0.01)
 
 
-def test_check_finds_meshes_next_to_the_urdf_and_in_packages(
-    folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    names = [
-        "meshes/hip.stl",
-        "package://dog_description/meshes/thigh.dae",
-        "package://dog_parts/calf.obj",
-        "package://nowhere/foot.stl",
-        "https://example.org/trunk.stl",
-    ]
-    made = tmp_path / "dog_description" / "robots"
-    found = [
-        made / "meshes" / "hip.stl",
-        tmp_path / "dog_description" / "meshes" / "thigh.dae",
-        tmp_path / "elsewhere" / "dog_parts" / "calf.obj",
-    ]
-    for path in found:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    for name in ("robot.toml", "robot.urdf"):
-        text = (folder / name).read_text(encoding="utf-8")
-        shapes = "".join(f'<geometry><mesh filename="{mesh}"/></geometry>' for mesh in names)
-        text = text.replace('<link name="trunk">', f'<link name="trunk"><visual>{shapes}</visual>')
-        (made / name).write_text(text, encoding="utf-8")
-    command = ["robot", "check", str(made), "--json"]
-    assert run([*command, "--package-path", str(tmp_path / "elsewhere")]) == 0
-    meshes = json.loads(capsys.readouterr().out)["meshes"]
-    assert [mesh["name"] for mesh in meshes] == names
-    assert [mesh["path"] for mesh in meshes] == [*map(str, found), None, None]
-    monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere:{tmp_path / 'elsewhere' / 'dog_parts'}")
-    assert run(["robot", "check", str(made)]) == 0
-    said = capsys.readouterr().out
-    assert "meshes: 3 of 5 found" in said and "missing: package://nowhere/foot.stl" in said
-
-
 def test_jobs_of_the_robot_have_its_controller_and_walks_unless_they_say_otherwise(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

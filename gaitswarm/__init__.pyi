@@ -1,13 +1,13 @@
 from gaitswarm.errors import Interrupted, JobEnded
 from gaitswarm.evidence.verify import verify
-from gaitswarm.firmware import FirmwareOptions, FirmwareView, write_firmware
+from gaitswarm.firmware import FirmwareView, write_firmware
 from gaitswarm.jobs.asynchronous import AsyncJobs
 from gaitswarm.jobs.base import JobEvent, Jobs
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
 from gaitswarm.optimization import OptimizationResult, optimize
-from gaitswarm.robustness_index import RobustnessOptions, RobustnessView, robustness
+from gaitswarm.robustness_index import RobustnessView, robustness
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
@@ -78,14 +78,14 @@ __all__ = [
     "AsyncJobs", "AutoSettings", "Backoff", "BayesianSettings", "BestView",
     "CalibrationSpec", "CertificateSpec", "CertificateView", "CmaEsSettings", "Conflict",
     "DatabaseJobs", "DeSettings", "EvaluationTable", "EvaluationView", "EvaluatorUnavailable",
-    "FirmwareOptions", "FirmwareView", "Forbidden", "FrontView", "GaitswarmError",
+    "FirmwareView", "Forbidden", "FrontView", "GaitswarmError",
     "HistoryIterationView", "HypeSettings", "IdempotencyConflict", "IdentifiabilityView",
     "IdentificationSpec", "ImportanceView", "Interrupted", "InvalidRequest", "IterationView",
     "JobComparisonView", "JobEnded", "JobEvent", "JobSpec", "JobSummaryView",
     "JobView", "Jobs", "LeaseLost", "NotFound", "OptimizationResult", "Preference",
     "PreferenceForView", "ProvenanceChanged", "PsoSettings", "QuotaExceeded",
     "RandomSearchSettings", "RankingView", "RecordedWalk", "RobotFiles", "RobotVariant",
-    "RobustPreferencesView", "RobustnessOptions", "RobustnessView", "Scenario",
+    "RobustPreferencesView", "RobustnessView", "Scenario",
     "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",

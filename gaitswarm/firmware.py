@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TypedDict, Unpack
 
 from pydantic import Field
 
@@ -22,27 +21,9 @@ from gaitswarm.sim.firmware.folder import (
 )
 from gaitswarm.sim.firmware.microcontroller import BUDGET
 from gaitswarm.sim.input import Line
+from gaitswarm.sim.robot import DEFAULT_ROBOT
+from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
-
-
-class FirmwareOptions(TypedDict, total=False):
-    """Fields of a `FirmwareRequest` as keywords.
-
-    Attributes:
-        scenarios: One scenario or several, whose trajectories are written and whose walks are
-            repeated: names or numbers of presets, or `Scenario`; default the six of table 4.2.
-        controller: Motor controller that drives the robot; default fuzzy-pi.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        label: Display name of the design.
-        table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
-            place of 10 and 6, where there is less flash.
-    """
-
-    scenarios: ScenarioInput | Iterable[ScenarioInput]
-    controller: ControllerName
-    robot: RobotInput
-    label: str
-    table_bits: tuple[int, int] | None
 
 
 class FirmwareRequest(ScenariosRequest):
@@ -213,7 +194,12 @@ def firmware_view(
 def write_firmware(
     design: Mapping[str, float | str],
     output: str | os.PathLike[str],
-    **options: Unpack[FirmwareOptions],
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
+    controller: ControllerName = "fuzzy-pi",
+    robot: RobotInput = DEFAULT_ROBOT,
+    label: str = "design",
+    table_bits: tuple[int, int] | None = None,
 ) -> FirmwareView:
     """Write a design as C99 for a leg's microcontroller (thesis chapter 5), with a test of it.
 
@@ -224,8 +210,14 @@ def write_firmware(
         design: Value of each of the controller's variables, and of any gait variable, in their
             units.
         output: New or empty folder, which is written as a whole or not at all.
-        **options: Robot, controller, scenarios and tables, see `FirmwareOptions`. With other
-            `table_bits` than the default's, the difference of simulations is reported.
+        scenarios: One scenario or several, whose trajectories are written and whose walks are
+            repeated: names or numbers of presets, or `Scenario`.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        label: Display name of the design.
+        table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
+            place of 10 and 6, where there is less flash; the difference of simulations is then
+            reported.
 
     Returns:
         Files, their sizes, and their memory on the thesis's microcontroller.
@@ -235,7 +227,15 @@ def write_firmware(
             is not empty or cannot be written; names the argument.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    request = checked(FirmwareRequest, {"design": design, **options})
+    arguments = {
+        "design": design,
+        "scenarios": scenarios,
+        "controller": controller,
+        "robot": robot,
+        "label": label,
+        "table_bits": table_bits,
+    }
+    request = checked(FirmwareRequest, arguments)
     folder = Path(output)
     check_new(folder)
     firmware = run_firmware(request)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Final
 
 import numpy as np
@@ -35,17 +36,20 @@ class GaitView(View):
     )
     suits: bool = Field(description="Whether it is defined for the robot's legs.")
     lags: dict[str, float] = Field(
+        default_factory=dict,
         description="By leg the share of the cycle by which its foot comes down after the first"
         " one's [1]; empty if the gait is not defined for the robot.",
         examples=[{"left_rear": 0.0, "left_front": 0.25}],
     )
     planned: PlannedGaitView | None = Field(
+        default=None,
         description="Duty factor and static stability in the scenario; null for a gait that"
-        " is not defined for the robot, or out of its legs' reach."
+        " is not defined for the robot, or out of its legs' reach.",
     )
     support: dict[str, str] = Field(
+        default_factory=dict,
         description="Footfall diagram: by leg one cycle in 40 columns, # where the foot stands and"
-        " . where it swings."
+        " . where it swings.",
     )
 
 
@@ -82,46 +86,39 @@ def planned_gaits(
 
 
 def _view(robot: Robot, scenario: Scenario, name: GaitName, duty: float | None) -> GaitView:
+    """Plan a gait; a named one has only the scenario's posture, stride and sway."""
     known = GAITS.get(name)
-    fits = known is None or suits(known, robot.legs)
-    if known is not None and duty is None:
-        duty = min(_MOST_DUTY, known.duty_factor(len(robot.legs)))
-    walked = _walked(scenario, name, duty)
-    with simulation_errors("scenario"):
-        of_legs = leg_gaits(robot, walked) if fits else ()
-        planned = _planned(robot, walked) if fits else None
-    stands = supporting(of_legs, (np.arange(COLUMNS) + 0.5) / COLUMNS)
-    legs_named = [leg.name for leg in robot.legs] if fits else []
-    return GaitView(
+    view = GaitView(
         name=name,
         description=_OWN if known is None else known.description,
         legs=[] if known is None else list(known.legs),
-        suits=fits,
-        lags={
-            leg: round(-gait.phase % 1.0, 6) % 1.0
-            for leg, gait in zip(legs_named, of_legs, strict=True)
-        },
-        planned=planned,
-        support={
-            leg: "".join("#" if stood else "." for stood in stands[:, k])
-            for k, leg in enumerate(legs_named)
-        },
+        suits=known is None or suits(known, robot.legs),
     )
-
-
-def _walked(scenario: Scenario, name: GaitName, duty: float | None) -> Scenario:
-    """The scenario in a gait; a named gait keeps only its posture, stride and sway."""
+    if not view.suits:
+        return view
     changes: dict[str, object] = {}
+    if known is not None:
+        duty = duty or min(_MOST_DUTY, known.duty_factor(len(robot.legs)))
+        changes = {"gait": name, "phases": None, "start_phase": 0.0, "by_group": None}
     if duty is not None:
         changes |= {"duty_factor": duty, "duty_phase": "support"}
-    if name != "own":
-        changes |= {"gait": name, "phases": None, "start_phase": 0.0, "by_group": None}
-    return scenario.model_copy(update=changes)
-
-
-def _planned(robot: Robot, scenario: Scenario) -> PlannedGaitView | None:
-    """Plan a gait; None where a leg does not reach its path."""
-    try:
-        return PlannedGaitView.model_validate(static_stability(robot, scenario))
-    except (UnreachablePose, BeyondJointLimit):
-        return None
+    walked, planned = scenario.model_copy(update=changes), None
+    with simulation_errors("scenario"):
+        of_legs = leg_gaits(robot, walked)
+        with suppress(UnreachablePose, BeyondJointLimit):
+            planned = PlannedGaitView.model_validate(static_stability(robot, walked))
+    stands = supporting(of_legs, (np.arange(COLUMNS) + 0.5) / COLUMNS)
+    legs = [leg.name for leg in robot.legs]
+    return view.model_copy(
+        update={
+            "lags": {
+                leg: round(-gait.phase % 1.0, 6) % 1.0
+                for leg, gait in zip(legs, of_legs, strict=True)
+            },
+            "planned": planned,
+            "support": {
+                leg: "".join("#" if stood else "." for stood in stands[:, k])
+                for k, leg in enumerate(legs)
+            },
+        }
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from pydantic import Field
 
@@ -27,36 +27,35 @@ from gaitswarm.sim.measurement.measured_log import (
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
 
-RecordingId = Annotated[
-    str,
-    Field(
+
+class RecordingBase(View):
+    """A recorded walk."""
+
+    id: str = Field(
         description="Identifier, as in `recordings` of a job.",
         examples=["0f343b0931126a20f133d67c2b018a3b"],
-    ),
-]
-Synthetic = Annotated[bool, Field(description="Whether it was computed, not measured.")]
-
-
-class RecordingView(View):
-    """A recorded walk without its numbers."""
-
-    id: RecordingId
-    scenario: str = Field(description="Name of its scenario.", examples=["normal-fast"])
-    walk: Scenario = Field(description="That scenario in full.")
-    controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
-    design: dict[str, float] = Field(
-        description="Value of each of its variables, and of any gait variable; of a categorical"
-        " one the index of a choice.",
-        examples=[{"P": 0.454, "I": 0.147}],
     )
+    scenario: str = Field(description="Name of its scenario.", examples=["normal-fast"])
+    controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
     joints: int = Field(description="Joints whose currents were measured.", examples=[18])
     rows: int = Field(description="Rows, 500 a second.", examples=[1500])
     seconds: float = Field(description="Time that is compared [s].", examples=[3.0])
+    synthetic: bool = Field(description="Whether it was computed, not measured.")
+
+
+class RecordingView(RecordingBase):
+    """A recorded walk without its numbers."""
+
+    walk: Scenario = Field(description="Its scenario in full.")
+    design: dict[str, float] = Field(
+        description="Value of each of the controller's variables, and of any gait variable; of a"
+        " categorical one the index of a choice.",
+        examples=[{"P": 0.454, "I": 0.147}],
+    )
     mean_current: float = Field(
         description="Mean over rows and joints of the absolute current [A].", examples=[0.14]
     )
     peak_current: float = Field(description="Largest of these currents [A].", examples=[0.85])
-    synthetic: Synthetic
 
     @classmethod
     def from_walk(cls, recording_id: str, walk: RecordedWalk) -> RecordingView:
@@ -75,24 +74,15 @@ class RecordingView(View):
         )
 
 
-class RecordingEntryView(View):
+class RecordingEntryView(RecordingBase):
     """A recorded walk in a list."""
 
-    id: RecordingId
     created_at: datetime = Field(description="When it was first stored.")
-    scenario: str = Field(description="Name of its scenario.")
-    controller: str = Field(description="Controller that drove it.")
-    joints: int = Field(description="Joints whose currents were measured.", examples=[18])
-    rows: int = Field(description="Rows.", examples=[1500])
-    rate: float = Field(description="Rows a second [1/s].", examples=[500.0])
-    seconds: float = Field(description="Time that is compared [s].", examples=[3.0])
     size: int = Field(description="Characters of the stored document.", examples=[206113])
-    synthetic: Synthetic
 
     @classmethod
     def from_entry(cls, entry: RecordingEntry) -> RecordingEntryView:
-        seconds = entry.rows * CONTROL_PERIOD
-        return cls(**asdict(entry), rate=1.0 / CONTROL_PERIOD, seconds=seconds)
+        return cls(**asdict(entry), seconds=entry.rows * CONTROL_PERIOD)
 
 
 class SignalView(View):

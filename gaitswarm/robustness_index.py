@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Final, TypedDict, TypeVar, Unpack
+from typing import Annotated, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +33,9 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
-from gaitswarm.simulation import evaluated
+from gaitswarm.simulation import ALL_SCENARIOS, evaluated
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
 
 Floats = NDArray[np.float64]
@@ -46,33 +46,6 @@ _SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
 
 Progress = Callable[[int, int], None]
 """Called with the number of simulations done and their total."""
-
-
-class RobustnessOptions(TypedDict, total=False):
-    """Fields of a `RobustnessRequest` as keywords.
-
-    Attributes:
-        scenarios: One scenario or several: names or numbers of presets, or `Scenario`; default the
-            six of table 4.2.
-        controller: Motor controller that drives the robot; default fuzzy-pi.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        precision: Of the physics' numbers; default double.
-        variables: Variables to vary, normalised by their bounds: names, or `Variable` with
-            bounds of your own; default all of the controller's.
-        samples: Designs to sample around the given one; default 256.
-        radius: Largest distance from it, as a share of each variable's bounds; default
-            0.02.
-        seed: Of the sample; default 1.
-    """
-
-    scenarios: ScenarioInput | Iterable[ScenarioInput]
-    controller: ControllerName
-    robot: RobotInput
-    precision: Precision
-    variables: Sequence[str | Variable]
-    samples: int
-    radius: float
-    seed: int
 
 
 class RobustnessRequest(WalksRequest):
@@ -205,9 +178,16 @@ class RobustnessView(Sensitivities):
 def robustness(
     design: Mapping[str, float | str],
     *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
+    controller: ControllerName = "fuzzy-pi",
+    robot: RobotInput = DEFAULT_ROBOT,
+    precision: Precision = "double",
+    variables: Sequence[str | Variable] | None = None,
+    samples: int = 256,
+    radius: float = 0.02,
+    seed: int = 1,
     cpus: int | None = None,
     progress: Progress | None = None,
-    **options: Unpack[RobustnessOptions],
 ) -> RobustnessView:
     """Estimate how robust a design is against small changes of its variables (thesis 4.4.3).
 
@@ -219,9 +199,14 @@ def robustness(
     Args:
         design: Value of each of the controller's variables, and of any gait variable, in the
             variables' units.
+        scenarios, controller, robot, precision: As for `simulate`.
+        variables: Variables to vary, normalised by their bounds: names, or `Variable` with
+            bounds of your own; default all of the controller's.
+        samples: Designs to sample around the given one.
+        radius: Largest distance from it, as a share of each variable's bounds.
+        seed: Of the sample.
         cpus: Threads; default all processors.
         progress: Called with the number of simulations done and their total.
-        **options: Scenarios and sample, see `RobustnessOptions`.
 
     Returns:
         The index with its interval, by scenario, objective and variable.
@@ -230,7 +215,18 @@ def robustness(
         InvalidRequest: An argument is invalid; names it.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    request = checked(RobustnessRequest, {"design": design, **options})
+    arguments = {
+        "design": design,
+        "scenarios": scenarios,
+        "controller": controller,
+        "robot": robot,
+        "precision": precision,
+        "variables": variables,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+    }
+    request = checked(RobustnessRequest, arguments)
     with simulation_errors("design"):
         return run_robustness(request, cpus=cpus, progress=progress)
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import pickle
-import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import cache
+from multiprocessing import get_context
 from types import MappingProxyType
 from typing import Any, ClassVar, Final
 from unittest import TestCase
@@ -76,12 +76,10 @@ class CaseContract:
 
     @property
     def case(self) -> Case:
-        """The case."""
         return create_case(self.read_settings, self.walk)
 
     @property
     def rows(self) -> Floats:
-        """The designs as an array."""
         return np.array([[design[n] for n in self.walk.variables] for design in self.designs])
 
     def test_settings_come_back_from_their_document(self) -> None:
@@ -94,11 +92,8 @@ class CaseContract:
     def test_it_stands_for_the_walk(self) -> None:
         case, walk = self.case, self.walk
         assert isinstance(case, Case)
-        assert (case.name, case.robots, case.objectives) == (
-            walk.name,
-            walk.robots,
-            walk.objectives,
-        )
+        for name in ("name", "robots", "objectives"):
+            assert getattr(case, name) == getattr(walk, name)
         assert case.duration > 0.0 and math.isfinite(case.duration)
 
     @property
@@ -116,13 +111,11 @@ class CaseContract:
         assert both.statuses[-1:].tobytes() == last.statuses.tobytes()
         turned = self.checked(case.run(rows[::-1]), len(rows))
         assert turned.objectives[::-1].tobytes() == both.objectives.tobytes()
+        self.checked(case.run(rows[:0]), 0)
 
     def test_another_process_gets_the_same_case(self) -> None:
         copy = pickle.loads(pickle.dumps(self.case))  # noqa: S301 - written by the line itself
         assert copy.run(self.rows).objectives.tobytes() == self.outcome.objectives.tobytes()
-
-    def test_no_designs_are_no_outcomes(self) -> None:
-        self.checked(self.case.run(self.rows[:0]), 0)
 
     def test_together_with_other_cases_it_has_the_same_bits(self) -> None:
         case, rows = self.case, self.rows
@@ -139,10 +132,7 @@ class CaseContract:
         refused(SimulationInputError, self.walk.variables[0], self.case.run, wrong)
 
     def test_a_pose_out_of_reach_is_a_status(self) -> None:
-        walk = self.walk
-        far = Walk(
-            walk.robot, walk.controller, with_gait(walk.scenario, {"stride": 1.0}), walk.variables
-        )
+        far = replace(self.walk, scenario=with_gait(self.walk.scenario, {"stride": 1.0}))
         outcome = create_case(self.read_settings, far).run(self.rows)
         assert (outcome.statuses != Status.OK).all()
 
@@ -181,19 +171,18 @@ class ControllerContract:
 
     @property
     def controller(self) -> Controller:
-        """The registered controller."""
         return CONTROLLERS[self.name]
 
     @property
     def walking_design(self) -> dict[str, float]:
         """Value of every variable."""
-        middle = {
-            v.name: float(round((v.low + v.high) / 2))
-            if v.kind != "continuous"
-            else (v.low + v.high) / 2
+        middle = {v.name: (v.low + v.high) / 2 for v in self.controller.variables}
+        whole = {
+            v.name: float(round(middle[v.name]))
             for v in self.controller.variables
+            if v.kind != "continuous"
         }
-        return middle | dict(self.design)
+        return middle | whole | dict(self.design)
 
     def test_names_are_its_own(self) -> None:
         names = [v.name for v in (*self.controller.variables, *self.controller.conventions)]
@@ -352,31 +341,21 @@ def through_json(optimizer: Optimizer) -> dict[str, Any]:
     return state
 
 
-def paths_of_another_process(states: Mapping[str, Mapping[str, Any]]) -> dict[str, list[bytes]]:
-    """Paths of a new process continued from states, by method."""
-    done = subprocess.run(
-        [sys.executable, "-m", "gaitswarm.testing"],
-        input=json.dumps(states),
-        capture_output=True,
-        text=True,
-        check=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    )
-    found = json.loads(done.stdout)
-    return {name: [bytes.fromhex(row) for row in rows] for name, rows in found.items()}
+def continued(name: str, state: dict[str, Any]) -> list[bytes]:
+    """Positions of a search continued from a state, as bytes."""
+    optimizer = search(name)
+    optimizer.load(state)
+    return bits(path(optimizer, name))
 
 
-def _go_on() -> None:
-    found = {}
-    for name, state in json.load(sys.stdin).items():
-        optimizer = search(name)
-        optimizer.load(state)
-        found[name] = [row.hex() for row in bits(path(optimizer, name))]
-    json.dump(found, sys.stdout)
+@cache
+def other_process() -> ProcessPoolExecutor:
+    """A new process, the same for all tests."""
+    return ProcessPoolExecutor(1, get_context("spawn"))
 
 
-class SearchContract:
-    """Tests of a registered search method, within one process.
+class OptimizerContract:
+    """Tests of a registered search method.
 
     Attributes:
         name: Of the method.
@@ -397,10 +376,6 @@ class SearchContract:
             found = whole_path(self.name, space)
             assert found.shape == (BUDGETS[space], box.dimension)
             assert (found >= box.low).all() and (found <= box.high).all()
-
-    def test_a_budget_is_kept_to_the_last_evaluation(self) -> None:
-        optimizer = search(self.name)
-        assert len(list(path(optimizer, self.name, evaluations=47))) == optimizer.evaluations == 47
 
     def test_the_same_seed_gives_the_same_bits_and_another_one_others(self) -> None:
         first = bits(whole_path(self.name))
@@ -431,11 +406,13 @@ class SearchContract:
             found = bits(path(search(self.name), self.name, most=most))
             assert found == bits(whole_path(self.name))
 
-    def test_no_ask_gives_more_than_the_settings_or_the_caller_allow(self) -> None:
-        optimizer = search(self.name)
-        for most in (None, 3, 100, 1) * 5:
+    def test_asks_are_counted_and_give_no_more_than_the_settings_or_the_caller_allow(self) -> None:
+        optimizer, evaluations = search(self.name), 0
+        for iteration, most in enumerate((None, 3, 100, 1) * 5):
+            assert (optimizer.iteration, optimizer.evaluations) == (iteration, evaluations)
             positions = optimizer.ask(most)
             assert 1 <= len(positions) <= min(PARTICLES, most or PARTICLES)
+            evaluations += len(positions)
             optimizer.tell(answer(self.name, positions))
 
     def test_start_positions_are_asked_for_first_and_survive_a_load(self) -> None:
@@ -468,28 +445,16 @@ class SearchContract:
         assert optimizer.ask(1).tobytes() == first_bits
         assert (optimizer.iteration, optimizer.evaluations) == (0, 0)
 
-    def test_tells_and_evaluations_are_counted(self) -> None:
-        optimizer, evaluations = search(self.name), 0
-        for k in range(5):
-            assert (optimizer.iteration, optimizer.evaluations) == (k, evaluations)
-            positions = optimizer.ask()
-            evaluations += len(positions)
-            optimizer.tell(answer(self.name, positions))
-
-    def test_a_search_of_which_everything_fails_keeps_searching(self) -> None:
-        optimizer, seen = search(self.name), set()
-        while optimizer.evaluations < BUDGET:
-            positions = optimizer.ask()
-            assert np.isfinite(positions).all()
-            seen |= {row.tobytes() for row in positions}
-            optimizer.tell(alike(self.name, np.full(len(positions), math.inf)))
-        assert len(seen) > BUDGET // 2
-
-    def test_a_search_goes_on_when_all_is_equal(self) -> None:
+    def test_a_search_goes_on_when_everything_fails_and_when_all_is_equal(self) -> None:
         for space in self.spaces:
-            optimizer = search(self.name, space)
-            while optimizer.evaluations < BUDGETS[space]:
-                optimizer.tell(alike(self.name, np.ones(len(optimizer.ask()))))
+            for value in (math.inf, 1.0):
+                optimizer, seen = search(self.name, space), set[bytes]()
+                while optimizer.evaluations < BUDGETS[space]:
+                    positions = optimizer.ask()
+                    assert np.isfinite(positions).all()
+                    seen |= set(bits(positions))
+                    optimizer.tell(alike(self.name, np.full(len(positions), value)))
+                assert space != "mixed" or math.isfinite(value) or len(seen) > BUDGET // 2
 
     def test_a_fitness_that_is_none_is_refused(self) -> None:
         optimizer = search(self.name)
@@ -532,16 +497,8 @@ class SearchContract:
             by_chance = [best("random", seed) for seed in range(7)]
             assert np.median(found) < np.median(by_chance)
 
-
-class OptimizerContract(SearchContract):
-    """Tests of a registered search method; attributes are those of `SearchContract`."""
-
     def test_another_process_goes_on_with_the_same_bits(self) -> None:
         stopped = search(self.name)
         done = len(list(path(stopped, self.name, evaluations=BUDGET // 2)))
-        found = paths_of_another_process({self.name: stopped.dump()})
-        assert found[self.name] == bits(whole_path(self.name)[done:])
-
-
-if __name__ == "__main__":
-    _go_on()
+        found = other_process().submit(continued, self.name, through_json(stopped)).result()
+        assert found == bits(whole_path(self.name)[done:])

@@ -55,7 +55,6 @@ def test_recordings_are_listed_by_pages_without_their_numbers(client: httpx2.Cli
         "controller": "fuzzy-pi",
         "joints": 18,
         "rows": 10,
-        "rate": 500.0,
         "seconds": 0.02,
         "synthetic": False,
     }

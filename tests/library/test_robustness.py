@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 import gaitswarm
@@ -10,7 +12,7 @@ from tests.examples.walks import short_walk
 pytestmark = pytest.mark.slow
 
 PI = {"P": 0.45, "I": 0.1}
-ASKED: gaitswarm.RobustnessOptions = {
+ASKED: dict[str, Any] = {
     "controller": "pi",
     "scenarios": short_walk(),
     "samples": 100,

@@ -5,15 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.services.optimizer.search.registry import METHODS
-from gaitswarm.testing import (
-    BUDGET,
-    SearchContract,
-    bits,
-    path,
-    paths_of_another_process,
-    search,
-    whole_path,
-)
+from gaitswarm.testing import BUDGET, OptimizerContract
 
 INSTALLED = [name for name in METHODS.built_in if name != "auto" and not METHODS[name].missing]
 """Methods whose libraries are installed; with the development lock, all but the name of others."""
@@ -27,7 +19,7 @@ def test_every_method_is_tested() -> None:
 
 
 @pytest.mark.variants(without=("bayesian",))
-class TestBuiltIn(SearchContract):
+class TestBuiltIn(OptimizerContract):
     @pytest.fixture(autouse=True, params=INSTALLED)
     def method(self, request: pytest.FixtureRequest) -> None:
         self.name = request.param
@@ -35,19 +27,3 @@ class TestBuiltIn(SearchContract):
         self.reloaded = REPLAYED_UNTIL.get(self.name, BUDGET)
         if self.name == "bayesian":
             self.seeds = 3
-
-
-@pytest.mark.variants("of few seconds")
-@pytest.mark.parametrize(
-    "methods",
-    [[name for name in INSTALLED if name not in REPLAYED_UNTIL], list(REPLAYED_UNTIL)],
-    ids=["of few seconds", "replayed"],
-)
-def test_another_process_continues_with_the_same_bits(methods: list[str]) -> None:
-    given, expected = {}, {}
-    for method in methods:
-        stopped = search(method)
-        done = list(path(stopped, method, evaluations=BUDGET // 2))
-        given[method] = stopped.dump()
-        expected[method] = bits(whole_path(method)[len(done) :])
-    assert paths_of_another_process(given) == expected

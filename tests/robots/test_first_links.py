@@ -73,7 +73,7 @@ def test_a_robot_on_a_world_is_read_as_pinocchio_reads_it_and_stands(
     assert [leg.hip[2] for leg in robot.legs] == pytest.approx([0.0] * 4, abs=1e-9)
     moved = f"{abs(above)} m {'above' if above > 0.0 else 'below'} that of 'world'"
     assert any(moved in note for note in made.guesses) == (kind == "fixed")
-    checked = check_robot(RobotFiles(toml=made.toml, urdf=made.urdf), folder=None)
+    checked = check_robot(RobotFiles(toml=made.toml, urdf=made.urdf))
     assert checked.warnings == []
     assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)
 

@@ -70,7 +70,7 @@ def test_neighbours_of_a_round_hexapod_step_in_turns() -> None:
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
     proposal, _ = made(layout)
-    checked = check_robot(RobotFiles(toml=proposal.toml, urdf=proposal.urdf), folder=None)
+    checked = check_robot(RobotFiles(toml=proposal.toml, urdf=proposal.urdf))
     assert checked.warnings == []
     assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)
 

@@ -19,8 +19,7 @@ from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from gaitswarm.sim.replay import CONTROL_RATE, Replay
 from gaitswarm.sim.replay import replay as replayed
 from gaitswarm.sim.robot import RobotFiles, load_robot
-from gaitswarm.sim.robot.shapes import Role
-from gaitswarm.sim.robot.urdf import SolidKind
+from gaitswarm.sim.robot.shapes import VisibleLink
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
 from gaitswarm.simulation import QUANTITIES
 
@@ -72,50 +71,6 @@ class ReplayRequest(WorldRequest):
 Vector = tuple[float, float, float]
 
 
-class ShapeView(View):
-    """A solid on a link."""
-
-    type: SolidKind = Field(description="Cylinders and capsules lie along their own z axis.")
-    size: tuple[float, ...] = Field(
-        description="box: edges x, y, z; sphere: radius; cylinder: radius, length; capsule: radius,"
-        " length between the centres of its hemispheres [m].",
-        examples=[[0.012, 0.12]],
-    )
-    origin: tuple[float, float, float, float, float, float, float] = Field(
-        description="Of the solid's centre in its link's frame: x, y, z [m], quaternion x, y, z, w."
-    )
-    role: Role = Field(description="Part of the robot that it shows.")
-
-
-class LinkMeshView(View):
-    """A mesh on a link, for display only."""
-
-    name: str = Field(
-        description="Of its file, as the URDF has it.",
-        examples=["package://a1_description/meshes/hip.dae"],
-    )
-    origin: tuple[float, float, float, float, float, float, float] = Field(
-        description="Of its frame in its link's: x, y, z [m], then quaternion x, y, z, w.",
-        examples=[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]],
-    )
-    scale: tuple[float, float, float] = Field(
-        description="Along its own x, y and z [1].", examples=[[0.001, 0.001, 0.001]]
-    )
-    colour: tuple[float, float, float, float] | None = Field(
-        description="Red, green, blue and opacity of its material, 0 to 1; null for none.",
-        examples=[[0.1, 0.1, 0.1, 1.0]],
-    )
-
-
-class LinkView(View):
-    """A link of the robot's URDF."""
-
-    name: str = Field(description="Its name.", examples=["body"])
-    parent: str | None = Field(description="Link that carries it; null for the body.")
-    shapes: list[ShapeView] = Field(description="Its solids; it may have none.")
-    meshes: list[LinkMeshView] = Field(description="Its meshes in the URDF; it may have none.")
-
-
 class MovingRobotView(View):
     """The robot's links and shapes."""
 
@@ -124,7 +79,7 @@ class MovingRobotView(View):
         description="SHA-256 of its robot.urdf, which identifies its meshes; null for a shipped"
         " robot, which has none."
     )
-    links: list[LinkView] = Field(description="All links, parents first; the body is the first.")
+    links: list[VisibleLink] = Field(description="All links, parents first; the body is the first.")
     joints: list[str] = Field(description="Joints in the order of channels.")
     legs: list[str] = Field(description="Legs in the order of channels.")
 
@@ -212,7 +167,7 @@ def run_replay(request: ReplayRequest) -> bytes:
         robot=MovingRobotView(
             name=robot.description.name,
             urdf=urdf_digest(request.robot.urdf) if isinstance(request.robot, RobotFiles) else None,
-            links=[LinkView.model_validate(link) for link in walk.links],
+            links=list(walk.links),
             joints=list(robot.joint_names),
             legs=legs,
         ),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from pydantic import ConfigDict, Field
 
@@ -11,7 +9,7 @@ from gaitswarm.designs import PUBLISHED_DESIGN
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.views import Request, View
 from gaitswarm.sim.catalogue import check_design, design_numbers
-from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, Inference
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.controllers.quantisation import OUTPUT_BITS
 from gaitswarm.sim.controllers.surface import Memberships, Surface, surface
 from gaitswarm.sim.variables import VariableName, VariableValue
@@ -126,6 +124,17 @@ class SurfaceView(View):
 
 def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceView:
     """Compute the surface of every output."""
+    try:
+        numbers = design_numbers(controller, request.design)
+        inferences = CONTROLLERS[controller].inferences(numbers)
+        if inferences:
+            check_design(controller, request.design)
+    except ValueError as error:
+        raise InvalidRequest(str(error).removeprefix("design: "), field="design") from error
+    if not inferences:
+        raise InvalidRequest(
+            f"{controller} has no fuzzy surface; choose a fuzzy controller", field="controller"
+        )
     surfaces = [
         surface(
             inference,
@@ -133,12 +142,8 @@ def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceV
             current_points=request.current_points,
             velocity=request.velocity_error,
         )
-        for inference in _inferences(controller, request.design)
+        for inference in inferences
     ]
-    if not surfaces:
-        raise InvalidRequest(
-            f"{controller} has no fuzzy surface; choose a fuzzy controller", field="controller"
-        )
     inputs = {name: m for output in surfaces for name, m in output.inputs.items()}
     held = {name: value for output in surfaces for name, value in output.held.items()}
     return SurfaceView(
@@ -147,18 +152,6 @@ def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceV
         velocity_error=held.get("velocity"),
         outputs=[_output(output) for output in surfaces],
     )
-
-
-def _inferences(
-    controller: ControllerName, design: Mapping[str, float | str]
-) -> tuple[Inference, ...]:
-    try:
-        inferences = CONTROLLERS[controller].inferences(design_numbers(controller, design))
-        if inferences:
-            check_design(controller, design)
-    except ValueError as error:
-        raise InvalidRequest(str(error).removeprefix("design: "), field="design") from error
-    return inferences
 
 
 def _universe(memberships: Memberships) -> UniverseView:

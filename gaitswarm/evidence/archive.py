@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib import resources
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json, to_json
 
-from gaitswarm.evidence import FORMAT, MANIFEST, VERSION
+from gaitswarm.evidence import MANIFEST
 from gaitswarm.evidence.page import CertificateOnPage, page
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
@@ -81,8 +80,6 @@ class JobDocument(_Document):
     started_at: datetime | None
     updated_at: datetime
     finished_at: datetime | None
-    iterations: int = Field(ge=1)
-    evaluations: int = Field(ge=1)
     budgets: tuple[Annotated[int, Field(ge=1, le=1_000_000)], ...] = Field(
         min_length=1, max_length=100
     )
@@ -99,39 +96,30 @@ class ChainDocument(_Document):
     digests: tuple[str | None, ...]
 
 
+class Manifest(BaseModel):
+    """SHA-256 of every member."""
+
+    model_config = ConfigDict(frozen=True)
+
+    format: Literal["gaitswarm-evidence"] = "gaitswarm-evidence"
+    version: Literal[1] = 1  # of the layout; others are refused
+    files: dict[str, str]
+
+
 def archived(members: Mapping[str, bytes]) -> bytes:
     """Write an archive."""
-    hashes = {
-        name: {"sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
-        for name, content in sorted(members.items())
-    }
-    manifest = {"format": FORMAT, "version": VERSION, "files": hashes}
-    text = json.dumps(manifest, indent=2).encode() + b"\n"
-    return zipped({**members, MANIFEST: text})
+    files = {name: hashlib.sha256(member).hexdigest() for name, member in sorted(members.items())}
+    return zipped({**members, MANIFEST: to_json(Manifest(files=files), indent=2) + b"\n"})
 
 
 def check_hashes(members: Mapping[str, bytes]) -> list[str]:
     """Compare an archive with its manifest."""
-    if MANIFEST not in members:
-        raise BadArchive(f"it has no {MANIFEST}")
-    manifest = parsed_json(members[MANIFEST], MANIFEST)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise BadArchive(f"{MANIFEST} is none of {FORMAT}")
-    if manifest.get("version") != VERSION:
-        raise BadArchive(
-            f"it is version {str(manifest.get('version'))[:20]} of {FORMAT}, this gaitswarm reads"
-            f" version {VERSION}"
-        )
-    files = manifest.get("files")
-    if not isinstance(files, dict):
-        raise BadArchive(f"{MANIFEST} names no files")
+    files = _parsed(Manifest.model_validate, members, MANIFEST).files
     found = [f"{name} is not in the manifest" for name in members if name not in {*files, MANIFEST}]
-    for name, expected in files.items():
+    for name, digest in files.items():
         if name not in members:
             found.append(f"{name} is missing")
-            continue
-        digest = hashlib.sha256(members[name]).hexdigest()
-        if not isinstance(expected, dict) or expected.get("sha256") != digest:
+        elif hashlib.sha256(members[name]).hexdigest() != digest:
             found.append(f"{name} has another SHA-256")
     return found
 
@@ -229,19 +217,13 @@ def check_robots(members: Mapping[str, bytes]) -> None:
 
 def _check_order(evidence: Evidence) -> None:
     """Check that iterations are whole, in order, and as large as the asks."""
-    job, columns = evidence.job, evidence.columns
-    sizes = [len(positions) for positions in evidence.asked]
+    columns, sizes = evidence.columns, [len(positions) for positions in evidence.asked]
     expected = np.repeat(np.arange(len(sizes)), sizes)
     particles = np.concatenate([np.arange(size) for size in sizes])
-    if (
-        len(sizes) != job.iterations
-        or len(columns) != job.evaluations
-        or not np.array_equal(columns.iteration, expected)
-        or not np.array_equal(columns.particle, particles)
+    if not (
+        np.array_equal(columns.iteration, expected) and np.array_equal(columns.particle, particles)
     ):
-        raise BadArchive(
-            f"{EVALUATIONS}, {ASKS} and {JOB} do not have the same iterations and particles"
-        )
+        raise BadArchive(f"{EVALUATIONS} and {ASKS} do not have the same iterations and particles")
 
 
 def _parsed(validate: Callable[[Any], T], members: Mapping[str, bytes], name: str) -> T:
@@ -398,8 +380,6 @@ def _run(service: JobService, job: Job) -> _Run:
             started_at=job.started_at,
             updated_at=job.updated_at,
             finished_at=job.finished_at,
-            iterations=end,
-            evaluations=job.progress.evaluations,
             budgets=budgets_of(job),
         ),
         SPEC: spec,

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.memory import require_room_for_scipy
@@ -22,6 +23,17 @@ from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.urdf import Link, SolidKind
 
 Floats = NDArray[np.float64]
+
+Colour = tuple[float, float, float, float]
+"""Red, green, blue and opacity, 0 to 1."""
+
+Pose = Annotated[
+    tuple[float, float, float, float, float, float, float],
+    Field(
+        description="In its link's frame: x, y, z [m], then quaternion x, y, z, w.",
+        examples=[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]],
+    ),
+]
 
 Role = Literal["body", "coxa", "femur", "tibia", "foot", "load"]
 
@@ -41,24 +53,56 @@ _UPRIGHT: Final = np.array([0.0, 0.0, 0.0, 1.0])
 class Shape:
     """One solid, fixed to a link."""
 
-    type: SolidKind
-    # edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a capsule along
-    # its own z, a capsule's between the centres of its hemispheres [m]
-    size: tuple[float, ...]
-    # pose of its centre in the link's frame: position [m], quaternion x y z w
-    origin: tuple[float, float, float, float, float, float, float]
-    role: Role  # part of the robot
+    type: Annotated[
+        SolidKind, Field(description="Cylinders and capsules lie along their own z axis.")
+    ]
+    size: Annotated[
+        tuple[float, ...],
+        Field(
+            description="box: edges x, y, z; sphere: radius; cylinder: radius, length; capsule:"
+            " radius, length between the centres of its hemispheres [m].",
+            examples=[[0.012, 0.12]],
+        ),
+    ]
+    origin: Pose
+    role: Annotated[Role, Field(description="Part of the robot that it shows.")]
+
+
+@dataclass(frozen=True, slots=True)
+class VisualMesh:
+    """A mesh on a link, for display only."""
+
+    name: Annotated[
+        str,
+        Field(
+            description="Of its file, as the URDF has it.",
+            examples=["package://a1_description/meshes/hip.dae"],
+        ),
+    ]
+    origin: Pose
+    scale: Annotated[
+        tuple[float, float, float],
+        Field(description="Along its own x, y and z [1].", examples=[[0.001, 0.001, 0.001]]),
+    ]
+    colour: Annotated[
+        Colour | None,
+        Field(
+            description="Red, green, blue and opacity of its material, 0 to 1; null for none.",
+            examples=[[0.1, 0.1, 0.1, 1.0]],
+        ),
+    ]
 
 
 @dataclass(frozen=True, slots=True)
 class VisibleLink:
-    """A link of the URDF; fixed ones are included."""
+    """A link of the robot's URDF; fixed ones are included."""
 
-    name: str  # as in the URDF
-    parent: str | None  # name of the link that carries it, None for the body
-    shapes: tuple[Shape, ...]
-    # meshes of the URDF, if any
-    meshes: tuple[VisualMesh, ...] = ()
+    name: Annotated[str, Field(description="Its name.", examples=["body"])]
+    parent: Annotated[str | None, Field(description="Link that carries it; null for the body.")]
+    shapes: Annotated[tuple[Shape, ...], Field(description="Its solids; it may have none.")]
+    meshes: Annotated[
+        tuple[VisualMesh, ...], Field(description="Its meshes in the URDF; it may have none.")
+    ] = ()
 
 
 def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
@@ -146,21 +190,7 @@ def _shape(kind: SolidKind, size: Floats, at: Floats, turn: Floats, role: Role) 
     return Shape(kind, tuple(size.tolist()), (x, y, z, qx, qy, qz, qw), role)
 
 
-Colour = tuple[float, float, float, float]
-"""Red, green, blue and opacity, 0 to 1."""
-
 _LARGEST_SCALE: Final = 1e6
-
-
-@dataclass(frozen=True, slots=True)
-class VisualMesh:
-    """A mesh on a link, for display only."""
-
-    name: str  # of its file, as the URDF has it
-    # pose of its frame in the link's: position [m], quaternion x y z w
-    origin: tuple[float, float, float, float, float, float, float]
-    scale: tuple[float, float, float]  # along its own x, y and z [1]
-    colour: Colour | None  # None if its material has none
 
 
 def material_colours(urdf: str) -> Mapping[str, Colour]:

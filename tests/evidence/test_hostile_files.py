@@ -122,17 +122,17 @@ def test_nesting_takes_none_of_the_stack_that_cleaning_up_needs() -> None:
 def test_a_manifest_that_is_invalid_is_refused(proved: Proved) -> None:
     members = unzipped(proved.content)
     for document, why in (
-        (b"[]", "is none of"),
-        (b"{}", "is none of"),
-        (json.dumps({"format": "gaitswarm-evidence", "version": 2}).encode(), "version 2"),
-        (json.dumps({"format": "gaitswarm-evidence", "version": 1}).encode(), "names no files"),
+        (b"[]", "cannot be read"),
+        (b"{}", "files"),
+        (json.dumps({"format": "another", "files": {}}).encode(), "format"),
+        (json.dumps({"version": 2, "files": {}}).encode(), "version"),
     ):
         assert why in refusal(zipped(members | {MANIFEST: document}))
 
 
 def test_a_manifest_cannot_vouch_for_itself(proved: Proved) -> None:
     manifest = json.loads(unzipped(proved.content)[MANIFEST])
-    manifest["files"][MANIFEST] = {"sha256": "0" * 64, "bytes": 1}
+    manifest["files"][MANIFEST] = "0" * 64
     found = gaitswarm.verify(with_manifest(proved.content, manifest), replay=0)
     assert [check.detail for check in found.checks if check.passed is False] == [
         f"{MANIFEST} has another SHA-256"

@@ -164,7 +164,7 @@ def test_one_bit_of_a_file_is_caught_by_its_hash(proved: Proved) -> None:
     assert failed(gaitswarm.verify(bytes(content), replay=0)) == ["archive"]
     members = unzipped(proved.content)
     manifest = json.loads(members[MANIFEST])
-    manifest["files"]["index.html"]["sha256"] = "0" * 64
+    manifest["files"]["index.html"] = "0" * 64
     found = gaitswarm.verify(with_manifest(proved.content, manifest), replay=0)
     assert failed(found) == ["hashes"]
     assert "index.html has another SHA-256" in found.checks[1].detail

@@ -8,8 +8,8 @@ import type { ResolvedDesign } from '../design/resolve-design'
 type Schemas = components['schemas']
 
 export type ReplayHeader = Schemas['ReplayHeaderView']
-export type Shape = Schemas['ShapeView']
-export type LinkMesh = Schemas['LinkMeshView']
+export type Shape = Schemas['Shape']
+export type LinkMesh = Schemas['VisualMesh']
 export type Channel = Schemas['ChannelView']
 
 const REPLAY_VERSION = 1

@@ -14,7 +14,7 @@ import { CATALOGUE } from '../catalogue-example'
 
 test('a stored recording is offered with a description', () => {
   const stored = { id: '0f343b0931126a20', created_at: '2026-03-01T10:00:00Z', size: 206113 }
-  const walk = { scenario: 'slope', controller: 'pi', joints: 18, rate: 500, seconds: 3 }
+  const walk = { scenario: 'slope', controller: 'pi', joints: 18, seconds: 3 }
   const choice = choiceOf({ ...stored, ...walk, rows: 1500, synthetic: true })
   expect([choice.value, choice.label]).toEqual([stored.id, '3.00 s of slope with pi'])
   expect(choice.note).toContain('0f343b093112 · 2026-03-01')

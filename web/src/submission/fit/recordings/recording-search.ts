@@ -30,11 +30,10 @@ export function recordingSearch(exclude: readonly string[]): Search {
 }
 
 export function choiceOf(recording: RecordingEntry): Choice {
-  const { id, seconds, scenario, controller, joints, rate, size } = recording
+  const { id, seconds, scenario, controller, joints, size } = recording
   const parts = [
     `${shortId(id)} · ${formatMoment(recording.created_at)}`,
     `${joints} joints`,
-    `${formatNumber(rate, 3)} rows per second`,
     `${formatNumber(size / 1000, 3)} kB`,
     recording.synthetic ? 'synthetic' : '',
   ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final, Literal
 from urllib.parse import unquote
@@ -34,16 +33,6 @@ _PACKAGES: Final = ("package", "model")
 """URL schemes whose path begins with a package."""
 
 
-@dataclass(frozen=True, slots=True)
-class FoundMesh:
-    """A mesh that a URDF names."""
-
-    name: str  # as the URDF has it
-    path: Path | None = None  # of its file, without links; None if it is not used
-    form: MeshFormat | None = None  # by the name's ending
-    problem: str | None = None  # why it is not used; None if it is
-
-
 class MeshFileView(View):
     """A mesh that a robot's URDF names, and whether this server has its file."""
 
@@ -65,8 +54,8 @@ def urdf_digest(urdf: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def served_meshes(folders: Sequence[Path], digest: str) -> list[FoundMesh]:
-    """Meshes of a robot in some folders.
+def served_meshes(folders: Sequence[Path], digest: str) -> dict[str, Path | str]:
+    """Meshes of a robot in some folders: by name its file, or why it is not served.
 
     Only files that the robot's own URDF names are served, with a mesh's extension, and at their
     `own_place` in its folder, with links resolved.
@@ -82,43 +71,43 @@ def served_meshes(folders: Sequence[Path], digest: str) -> list[FoundMesh]:
         except (OSError, ValueError, RobotFileError):
             continue
         if urdf_digest(text) == digest:
-            return [_served(name, folder.resolve()) for name in mesh_names(text)]
-    return []
+            return {name: _served(name, folder.resolve()) for name in mesh_names(text)}
+    return {}
 
 
-def _served(name: str, folder: Path) -> FoundMesh:
+def _served(name: str, folder: Path) -> Path | str:
     place = own_place(name)
-    mesh = found_mesh(name, [] if place is None else [folder / place])
-    if mesh.path is not None and not mesh.path.is_relative_to(folder):
-        return FoundMesh(name, problem="its file is outside of the robot's folder")
-    return mesh
+    found = found_mesh(name, [] if place is None else [folder / place])
+    if isinstance(found, Path) and not found.is_relative_to(folder):
+        return "its file is outside of the robot's folder"
+    return found
 
 
 def mesh_views(folders: Sequence[Path], digest: str) -> list[MeshFileView]:
     """Describe the meshes of a robot."""
     return [
         MeshFileView(
-            name=mesh.name,
-            format=mesh.form,
-            url=None if mesh.path is None else f"{PREFIX}/robots/{digest}/meshes/{number}",
-            problem=mesh.problem,
+            name=name,
+            format=FORMS.get(Path(name).suffix.lower()),
+            url=None if isinstance(found, str) else f"{PREFIX}/robots/{digest}/meshes/{number}",
+            problem=found if isinstance(found, str) else None,
         )
-        for number, mesh in enumerate(served_meshes(folders, digest))
+        for number, (name, found) in enumerate(served_meshes(folders, digest).items())
     ]
 
 
 def mesh_content(folders: Sequence[Path], digest: str, number: int) -> bytes:
     """A mesh of a robot, by its number in the list."""
-    meshes = served_meshes(folders, digest)
+    meshes = list(served_meshes(folders, digest).items())
     if number >= len(meshes):
         raise NotFound(f"the robot has no mesh {number}, but {len(meshes)} in all")
-    mesh = meshes[number]
-    if mesh.path is None:
-        raise NotFound(f"mesh {mesh.name[:200]}: {mesh.problem}")
+    name, found = meshes[number]
+    if isinstance(found, str):
+        raise NotFound(f"mesh {name[:200]}: {found}")
     try:
-        return mesh.path.read_bytes()
+        return found.read_bytes()
     except OSError as error:
-        raise NotFound(f"mesh {mesh.name[:200]}: {error.strerror}") from error
+        raise NotFound(f"mesh {name[:200]}: {error.strerror}") from error
 
 
 def copy_meshes(
@@ -131,17 +120,17 @@ def copy_meshes(
     sources: dict[Path, Path] = {}
     copied, left_out = [], dict[str, str]()
     for name in mesh_names(urdf):
-        mesh, place = found_mesh(name, mesh_places(name, folder, packages)), own_place(name)
-        if mesh.path is None:
-            left_out[name] = str(mesh.problem)
+        found, place = found_mesh(name, mesh_places(name, folder, packages)), own_place(name)
+        if isinstance(found, str):
+            left_out[name] = found
         elif place is None:
             left_out[name] = "its name is absolute, or leads out of its package"
-        elif sources.setdefault(place, mesh.path) != mesh.path:
+        elif sources.setdefault(place, found) != found:
             left_out[name] = f"another one is {place.as_posix()} in the folder"
         else:
             target = output / place
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(mesh.path.read_bytes())
+            target.write_bytes(found.read_bytes())
             copied.append(name)
     return copied, left_out
 
@@ -153,23 +142,21 @@ def mesh_names(urdf: str) -> list[str]:
     return list(dict.fromkeys(name for name in named if name))
 
 
-def found_mesh(name: str, places: Iterable[Path]) -> FoundMesh:
-    """Look for a mesh."""
+def found_mesh(name: str, places: Iterable[Path]) -> Path | str:
+    """Return a mesh's file in the first place that has it, or why it is not used."""
     form = FORMS.get(Path(name).suffix.lower())
     if form is None:
-        return FoundMesh(name, problem="it is none of STL, OBJ and DAE")
+        return "it is none of STL, OBJ and DAE"
     for path in places:
         try:
             real = path.resolve(strict=True)
-            if not real.is_file() or FORMS.get(real.suffix.lower()) != form:
-                continue
-            if real.stat().st_size > LARGEST_MESH:
-                problem = f"it has more than {LARGEST_MESH // 2**20} MiB; simplify it"
-                return FoundMesh(name, form=form, problem=problem)
+            if real.is_file() and FORMS.get(real.suffix.lower()) == form:
+                if real.stat().st_size <= LARGEST_MESH:
+                    return real
+                return f"it has more than {LARGEST_MESH // 2**20} MiB; simplify it"
         except (OSError, ValueError, RuntimeError):  # not there, or a loop of links
             continue
-        return FoundMesh(name, real, form)
-    return FoundMesh(name, form=form, problem="its file was not found")
+    return "its file was not found"
 
 
 def mesh_places(name: str, folder: Path, packages: Sequence[Path] = ()) -> Iterator[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from typing import Annotated
 
 from pydantic import Field
@@ -396,10 +397,8 @@ class ServedJobs(DatabaseJobs):
         """
         seconds = request.simulated_seconds([resolved(request.scenario)])
         self._context.limits.check(seconds, logged=True, field="scenario")
-        measured = read_measured_walk(request)
-        return measured.view(
-            self._service.store.add_recording(measured.walk, actor=self._context.actor)
-        )
+        store = partial(self._service.store.add_recording, actor=self._context.actor)
+        return read_measured_walk(request, store)
 
     @robots(
         "GET /recordings/{recording_id}/summary",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import datetime
-from typing import NamedTuple
 
 from pydantic import Field
 
@@ -18,10 +18,8 @@ from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import (
-    MeasuredLog,
     MeasuredWalk,
     Quantity,
-    Synchronised,
     synchronise,
 )
 from gaitswarm.sim.robot import load_robot
@@ -127,37 +125,13 @@ class MeasuredWalkRequest(DesignRequest):
     )
 
 
-class ReadWalk(NamedTuple):
-    """The contents of a measured log; pair: its whole cycles, synchronised with simulated ones."""
+def read_measured_walk(
+    request: MeasuredWalkRequest, store: Callable[[RecordedWalk], str]
+) -> MeasuredWalkView:
+    """Read a log, find its lag from the simulated design, and store a recording of it.
 
-    log: MeasuredLog
-    pair: Synchronised
-    walk: RecordedWalk
-
-    def view(self, recording_id: str) -> MeasuredWalkView:
-        """Describe the log and its recording, stored under an id."""
-        return MeasuredWalkView(
-            recording=RecordingView.from_walk(recording_id, self.walk),
-            rows=len(self.log.time),
-            seconds=len(self.log.time) * CONTROL_PERIOD,
-            signals=[
-                SignalView(
-                    name=quantity.value,
-                    unit=quantity.unit,
-                    description=quantity.meaning,
-                    channels=len(self.log.channels(quantity)),
-                )
-                for quantity in Quantity
-            ],
-            offset=self.pair.lag_seconds,
-            cycles=self.pair.cycles,
-            cycle_time=self.pair.cycle_time,
-            correlation=self.pair.correlation,
-        )
-
-
-def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
-    """Read a log, simulate the design, and find the lag between the two."""
+    store: returns the recording's id.
+    """
     request.check_design()
     scenario, design = resolved(request.scenario), request.numbers
     robot = load_robot(request.robot)
@@ -169,6 +143,24 @@ def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
         with simulation_errors("scenario"):
             simulated = walk.simulated()
         pair = synchronise(log, simulated, walk.cycle_time)
-        return ReadWalk(log, pair, record(pair, scenario, request.controller, design))
+        recording = record(pair, scenario, request.controller, design)
     except MeasuredLogError as error:
         raise InvalidRequest(str(error), field="log") from error
+    return MeasuredWalkView(
+        recording=RecordingView.from_walk(store(recording), recording),
+        rows=len(log.time),
+        seconds=len(log.time) * CONTROL_PERIOD,
+        signals=[
+            SignalView(
+                name=quantity.value,
+                unit=quantity.unit,
+                description=quantity.meaning,
+                channels=len(log.channels(quantity)),
+            )
+            for quantity in Quantity
+        ],
+        offset=pair.lag_seconds,
+        cycles=pair.cycles,
+        cycle_time=pair.cycle_time,
+        correlation=pair.correlation,
+    )

@@ -315,8 +315,8 @@ def init_robot(
     places = [Path(package) for package in packages]
 
     def bounds(mesh: str) -> NDArray[np.float64] | None:
-        path = found_mesh(mesh, mesh_places(mesh, source.parent, places)).path
-        return None if path is None else mesh_bounds(path)
+        found = found_mesh(mesh, mesh_places(mesh, source.parent, places))
+        return mesh_bounds(found) if isinstance(found, Path) else None
 
     try:
         proposal = walking_proposal(text, chosen, actuator, frame, bounds)

@@ -258,13 +258,9 @@ def run_robustness(
     center = dict(zip(sample.names, sample.designs[0].tolist(), strict=True))
     return RobustnessView(
         **dict(sensitivities(sample, objectives, failed, names)),
+        **request.model_dump(include={"controller", "precision", "samples", "radius", "seed"}),
         robot=request.robot,
-        controller=request.controller,
         design=design_shown(request.controller, center),
-        precision=request.precision,
-        samples=len(sample.designs) - 1,
-        radius=sample.radius,
-        seed=request.seed,
         variables=[
             SampledVariableView(name=variable.name, least=values.min(), most=values.max())
             for variable in sample.varied

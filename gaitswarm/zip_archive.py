@@ -20,9 +20,6 @@ LARGEST_ARCHIVE: Final = 1 << 30
 
 MOST_MEMBERS: Final = 10_000
 
-_TIME: Final = (1980, 1, 1, 0, 0, 0)
-"""The earliest date that a zip archive can have."""
-
 _UNIX: Final = 3
 
 _NEW: Final = stat.S_IFREG | 0o644
@@ -37,7 +34,7 @@ def zipped(members: Mapping[str, bytes]) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, content in sorted(members.items()):
-            entry = zipfile.ZipInfo(name, _TIME)
+            entry = zipfile.ZipInfo(name)
             entry.create_system = _UNIX
             entry.external_attr = _NEW << 16
             archive.writestr(entry, content)

@@ -7,7 +7,6 @@ import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from importlib import resources
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
@@ -40,7 +39,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification import RecordedWalk, Recordings
 from gaitswarm.sim.input import message_of
-from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 from gaitswarm.tables import decoded_table, encoded_table
 from gaitswarm.views.job import BestView, IterationView
@@ -404,8 +403,7 @@ def _run(service: JobService, job: Job) -> _Run:
     if reevaluated is not None:
         parts = [reevaluated] if len(reevaluated) else []
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
-    for number, robot in enumerate(spec.robot_sources):
-        files |= robot_members(f"robots/{number}", robot)
+    files |= robot_members(spec.robot_sources)
     return _Run(files, columns, view, summary)
 
 
@@ -474,17 +472,11 @@ def _asks(spec: AnySpec, links: Sequence[Link]) -> bytes:
     return sink.getvalue()
 
 
-def robot_members(folder: str, source: RobotSource) -> dict[str, bytes]:
-    """The resolved robot and its source files."""
-    robot = load_robot(source)
-    files = {
-        f"{folder}/description.json": robot.description.model_dump_json().encode(),
-        f"{folder}/robot.urdf": robot.urdf.text.encode(),
-    }
-    if isinstance(source, RobotFiles):
-        return {**files, f"{folder}/robot.toml": source.toml.encode()}
-    name = source.name if isinstance(source, RobotVariant) else source
-    for file in (resources.files("gaitswarm.sim.robot") / name).iterdir():
-        if file.name.endswith(".toml"):
-            files[f"{folder}/{file.name}"] = file.read_bytes()
+def robot_members(sources: Sequence[RobotSource]) -> dict[str, bytes]:
+    """The resolved robots."""
+    files = {}
+    for number, robot in enumerate(map(load_robot, sources)):
+        description = robot.description.model_dump_json()
+        files[f"robots/{number}/description.json"] = description.encode()
+        files[f"robots/{number}/robot.urdf"] = robot.urdf.text.encode()
     return files

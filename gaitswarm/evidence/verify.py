@@ -291,24 +291,21 @@ def _tried(check: Callable[[Evidence], Answer], evidence: Evidence) -> Answer:
 
 def _robot(evidence: Evidence) -> Answer:
     """Check the robots' files against the digests of the provenance, and against the spec."""
-    content, members = b"", evidence.members
-    files: dict[str, bytes] = {}
-    for number, source in enumerate(evidence.spec.robot_sources):
-        folder = f"robots/{number}"
-        for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
+    members, code = evidence.members, evidence.provenance[-1].provenance.simulation
+    content = b""
+    for number in range(len(evidence.spec.robot_sources)):
+        for name in (f"robots/{number}/description.json", f"robots/{number}/robot.urdf"):
             if name not in members:
                 return False, f"it has no {name}"
             content += members[name]
-        files |= robot_members(folder, source)
-    simulation = evidence.provenance[-1].provenance.simulation
-    if hashlib.sha256(content).hexdigest()[:_DIGITS] != simulation.robot_digest:
+    if hashlib.sha256(content).hexdigest()[:_DIGITS] != code.robot_digest:
         return False, "the robot's files are not those that the provenance names"
-    if simulation.code_digest == job_provenance(evidence.spec).simulation.code_digest:
-        found = {name: member for name, member in members.items() if name.startswith("robots/")}
-        wrong = sorted(n for n in found | files if found.get(n) != files.get(n))
+    if code.code_digest == job_provenance(evidence.spec).simulation.code_digest:
+        files = robot_members(evidence.spec.robot_sources)
+        wrong = [name for name, file in files.items() if members[name] != file]
         if wrong:
             return False, f"{wrong[0]} is not of the robot in the spec"
-    return True, f"its files have the digest {simulation.robot_digest} of the provenance"
+    return True, f"its files have the digest {code.robot_digest} of the provenance"
 
 
 def _fitness(evidence: Evidence) -> Answer:

@@ -52,7 +52,8 @@ def test_the_folder_shows_its_meshes_wherever_it_goes(
     moved = output.rename(tmp_path / "elsewhere" / "moved")
     (tmp_path / "ros").rename(tmp_path / "gone")
     digest = urdf_digest((moved / "robot.urdf").read_text(encoding="utf-8"))
-    assert [mesh.name for mesh in served_meshes([moved], digest) if mesh.path] == list(contents)
+    served = served_meshes([moved], digest)
+    assert [name for name, found in served.items() if isinstance(found, Path)] == list(contents)
     assert [mesh_content([moved], digest, n).decode() for n in range(4)] == list(contents)
 
     urdf = tmp_path / "gone" / "dog_description" / "robots" / "dog.urdf"

@@ -74,7 +74,7 @@ def test_a_log_is_uploaded_and_an_identification_submitted(
     field = page.get_by_role("combobox", name="Stored recordings")
     field.fill("NORMAL-F")
     offered = page.get_by_role("option", name=re.compile(recording[:12]))
-    expect(offered).to_contain_text("18 joints · 500 rows per second")
+    expect(offered).to_contain_text("18 joints")
     offered.click()
     expect(selected).to_contain_text("1.50 s of normal-fast")
     field.fill(recording)

@@ -18,7 +18,7 @@ test('a stored recording is offered with a description', () => {
   const choice = choiceOf({ ...stored, ...walk, rows: 1500, synthetic: true })
   expect([choice.value, choice.label]).toEqual([stored.id, '3.00 s of slope with pi'])
   expect(choice.note).toContain('0f343b093112 · 2026-03-01')
-  expect(choice.note).toContain('18 joints · 500 rows per second · 206 kB · synthetic')
+  expect(choice.note).toContain('18 joints · 206 kB · synthetic')
 })
 
 test.each([

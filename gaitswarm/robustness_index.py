@@ -199,7 +199,10 @@ def robustness(
     Args:
         design: Value of each of the controller's variables, and of any gait variable, in the
             variables' units.
-        scenarios, controller, robot, precision: As for `simulate`.
+        scenarios: One scenario or several: names or numbers of presets, or `Scenario`.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        precision: Of the physics' numbers.
         variables: Variables to vary, normalised by their bounds: names, or `Variable` with
             bounds of your own; default all of the controller's.
         samples: Designs to sample around the given one.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from gaitswarm.sim.measurement.measured_log import Synchronised
-    from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison
+    from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison, Verdict
 
 REPORT: Final = "report.md"
 
@@ -58,6 +58,8 @@ def _lines(comparison: Comparison, facts: Mapping[str, str], *, leg: str) -> Ite
         "repeats": str(comparison.repeats),
     }
     yield from _table(["", ""], [[k, v] for k, v in {**facts, **common}.items()])
+    yield from ("", "## Verdict", "")
+    yield from (f"- {line}" for line in verdict_lines(comparison.verdict))
     yield from ("", "X is measured, Y simulated; formulas are in docs/validation.md of gaitswarm.")
     yield from ("", "![RMAE by quantity and link](rmae.png)", "")
     yield from ("## Tolerance classes of RMAE", "")
@@ -150,6 +152,16 @@ def comparison_table(comparison: Comparison) -> Table:
         for quantity, a in _by_link(comparison)
     )
     return table(heads, rows, gap=1)
+
+
+def verdict_lines(verdict: Verdict) -> Iterator[str]:
+    """Yield the verdict, and the reason of each failed gate."""
+    passed = ", ".join(gate.quantity for gate in verdict.gates if gate.passed) or "none"
+    yield f"{'validated' if verdict.validated else 'not validated'}; passed: {passed}"
+    for gate in verdict.gates:
+        if not gate.passed:
+            end = " (a digital signal: this ends it)" if gate.quantity.digital else ""
+            yield f"{gate.quantity} failed{end}: {gate.reason}"
 
 
 def confidence_table(comparison: Comparison) -> Table:

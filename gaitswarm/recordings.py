@@ -24,6 +24,7 @@ from gaitswarm.sim.measurement.measured_log import (
 )
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
+from gaitswarm.sim.validation import Verdict, compare_synchronised
 
 
 class RecordingBase(View):
@@ -108,6 +109,7 @@ class MeasuredWalkView(View):
         description="Of the log's desired angles with the simulated ones, 1 for the same gait.",
         examples=[0.9998],
     )
+    verdict: Verdict = Field(description="Whether the log validates the model (thesis 2.3).")
 
 
 class MeasuredWalkRequest(DesignRequest):
@@ -163,4 +165,5 @@ def read_measured_walk(
         cycles=pair.cycles,
         cycle_time=pair.cycle_time,
         correlation=pair.correlation,
+        verdict=compare_synchronised(pair).verdict,
     )

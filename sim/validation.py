@@ -217,6 +217,26 @@ class QuantityComparison(_Data):
     spectra: tuple[Harmonics, ...] = Field(default=(), description="of currents, by link")
 
 
+class Gate(_Data):
+    """A quantity's part in the verdict."""
+
+    quantity: Quantity = Field(description="Its symbol in table 2.2.")
+    passed: bool = Field(description="Whether each of its links is within the tolerance.")
+    reason: str = Field(description="Links that fail and their classes; empty if it passed.")
+
+
+class Verdict(_Data):
+    """Whether the model is validated for a walk (thesis 2.3).
+
+    Digital signals come first, and one that is not as exact as a digital measurement ends the
+    procedure. Then every link of the analog signals must be green or yellow, or orange with the
+    simulated mean inside CONF. Supplementary quantities have no part.
+    """
+
+    validated: bool = Field(description="Whether every gate was passed.")
+    gates: tuple[Gate, ...] = Field(description="In their order, up to a failed digital one.")
+
+
 class Comparison(_Data):
     """Comparison of a measured with a simulated walk over the same whole walking cycles."""
 
@@ -228,6 +248,7 @@ class Comparison(_Data):
     repeats: int = Field(description="further measurements, for CONF")
     synthetic: bool = Field(description="whether the measured log was computed, as it says")
     quantities: tuple[QuantityComparison, ...]
+    verdict: Verdict
 
     def quantity(self, quantity: Quantity) -> QuantityComparison:
         for known in self.quantities:
@@ -250,6 +271,9 @@ def compare(
 
 
 def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()) -> Comparison:
+    quantities = tuple(
+        _judge(quantity, pair, repeats) for quantity in Quantity if pair.measured.channels(quantity)
+    )
     return Comparison(
         lag=pair.lag_seconds,
         correlation=pair.correlation,
@@ -258,12 +282,45 @@ def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()
         samples=len(pair.measured.time),
         repeats=len(repeats),
         synthetic=pair.measured.synthetic,
-        quantities=tuple(
-            _judge(quantity, pair, repeats)
-            for quantity in Quantity
-            if pair.measured.channels(quantity)
-        ),
+        quantities=quantities,
+        verdict=_verdict(quantities),
     )
+
+
+def _verdict(quantities: Sequence[QuantityComparison]) -> Verdict:
+    gates = list[Gate]()
+    # In the order of table 2.2, in which digital signals are first.
+    for judged in quantities:
+        if judged.quantity.optional:
+            continue
+        failures = [
+            f"{agreement.name} {failure}"
+            for agreement in judged.links or (judged.whole,)
+            if (failure := _failure(judged.quantity, agreement))
+        ]
+        gates.append(
+            Gate(quantity=judged.quantity, passed=not failures, reason="; ".join(failures))
+        )
+        if failures and judged.quantity.digital:
+            break
+    return Verdict(validated=all(gate.passed for gate in gates), gates=tuple(gates))
+
+
+def _failure(quantity: Quantity, agreement: Agreement) -> str:
+    """Why a signal is not validated; empty if it is."""
+    match agreement.tolerance, quantity.digital, agreement.within_confidence:
+        case (Tolerance.GREEN, _, _) | (Tolerance.YELLOW, False, _):
+            return ""
+        case Tolerance.ORANGE, False, True:
+            return ""
+        case Tolerance.ORANGE, False, None:
+            return "orange, without repeated measurements for CONF"
+        case Tolerance.ORANGE, False, False:
+            return "orange, outside CONF"
+        case tolerance, True, _:
+            return f"{tolerance}, where a digital signal must be green"
+        case tolerance, _, _:
+            return f"{tolerance}, {tolerance.phrase}"
 
 
 def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) -> Floats:

@@ -336,12 +336,13 @@ def validate(
     *,
     place: Place,
 ) -> Printed:
-    """Simulate a measured walk, and classify the differences by tolerance."""
+    """Simulate a measured walk, classify the differences by tolerance, and give a verdict."""
     from gaitswarm.cli.validation import (
         alignment,
         comparison_table,
         confidence_table,
         remarks,
+        verdict_lines,
         write_report,
     )
     from gaitswarm.sim.validation import compare_synchronised
@@ -368,6 +369,7 @@ def validate(
         if comparison.repeats:
             yield confidence_table(comparison)
         yield alignment(comparison)
+        yield from verdict_lines(comparison.verdict)
 
     return comparison, parts()
 

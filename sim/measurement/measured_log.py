@@ -64,6 +64,11 @@ class Quantity(StrEnum):
         return quantity
 
     @property
+    def digital(self) -> bool:
+        """Whether the robot computes it, instead of measuring it."""
+        return self in (Quantity.DESIRED_ANGLE, Quantity.CONTROL_VOLTAGE)
+
+    @property
     def optional(self) -> bool:
         """Whether it is supplementary in table 2.2."""
         return self in (Quantity.POTENTIOMETER, Quantity.BODY_ACCELERATION)

@@ -149,6 +149,9 @@ def test_a_measured_log_is_read_and_its_whole_cycles_are_recorded(
     assert read["correlation"] == pytest.approx(1.0)
     channels = {signal["name"]: signal["channels"] for signal in read["signals"]}
     assert channels["I_M"] == 18 and channels["U_S"] == 6 and channels["a_BODY"] == 3
+    # The default robot is not the one of the log; its gait is.
+    assert read["verdict"]["validated"] is False
+    assert [g["passed"] for g in read["verdict"]["gates"] if g["quantity"] == "q_D"] == [True]
     kept = RecordedWalk.model_validate(client.get(answer.headers["Location"]).json())
     assert kept.first_tick == 500
     assert kept.amperes == pytest.approx(log.current[490:], abs=1e-5)

@@ -59,6 +59,7 @@ def test_the_table_shows_links_units_and_classes(measured: Path) -> None:
     for text in ("q_D [rad]", "I_M [A]", "U_S [V]", "a_BODY [g]", "link 3", "RMAE", "green"):
         assert text in shown.out
     assert "0.124 s later" in shown.out
+    assert "not validated; passed: q_D\nU_P failed (a digital signal: this ends it)" in shown.out
     assert "SYNTHETIC" in shown.err
 
 
@@ -93,6 +94,7 @@ def test_the_report_has_tables_and_pictures(measured: Path, tmp_path: Path) -> N
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     assert "SYNTHETIC" in text
     assert "| U_P [V] | left_rear_tibia |" in text
+    assert "- not validated; passed: q_D" in text
     for tolerance in Tolerance:
         assert tolerance.phrase in text
 

@@ -66,6 +66,45 @@ def test_repeated_measurements_give_a_confidence_interval() -> None:
     assert compare(weak, LOG, CYCLE_TIME).quantity(Quantity.CURRENT).whole.confidence is None
 
 
+def test_a_log_within_the_tolerances_validates_the_model() -> None:
+    close = replace(LOG, joint_angle=1.01 * LOG.joint_angle, current=1.08 * LOG.current)
+    verdict = compare(LOG, close, CYCLE_TIME).verdict
+    assert verdict.validated
+    assert [gate.quantity for gate in verdict.gates] == ["q_D", "U_P", "q", "I_M", "U_S"]
+    assert all(gate.passed and not gate.reason for gate in verdict.gates)
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "gates", "reason"),
+    [
+        ("desired_angle", 1.03, ["q_D"], "link 1 yellow, where a digital signal must be green"),
+        ("control_voltage", 1.2, ["q_D", "U_P"], "link 3 orange, where a digital signal"),
+        ("joint_angle", 1.4, ["q_D", "U_P", "q", "I_M", "U_S"], "link 2 red, unacceptable"),
+        ("current", 1.6, ["q_D", "U_P", "q", "I_M", "U_S"], "link 3 purple, a serious error"),
+        ("supply", 1.2, ["q_D", "U_P", "q", "I_M", "U_S"], "all orange, without repeated"),
+    ],
+)
+def test_a_failed_gate_names_its_links_and_a_digital_one_ends_it(
+    column: str, factor: float, gates: list[str], reason: str
+) -> None:
+    off = replace(LOG, **{column: factor * getattr(LOG, column)})
+    verdict = compare(LOG, off, CYCLE_TIME).verdict
+    assert not verdict.validated
+    assert [gate.quantity for gate in verdict.gates] == gates
+    (failed,) = [gate for gate in verdict.gates if not gate.passed]
+    assert failed.quantity.column == column
+    assert reason in failed.reason
+
+
+def test_an_orange_signal_is_validated_inside_the_confidence_interval_alone() -> None:
+    weak, strong = (replace(LOG, current=f * LOG.current) for f in (0.8, 1.2))
+    inside = compare(weak, LOG, CYCLE_TIME, repeats=[strong])
+    assert inside.quantity(Quantity.CURRENT).whole.tolerance is Tolerance.ORANGE
+    assert inside.verdict.validated
+    outside = compare(LOG, strong, CYCLE_TIME, repeats=[weak]).verdict
+    assert "link 1 orange, outside CONF" in outside.gates[3].reason
+
+
 def test_what_was_not_measured_is_not_judged() -> None:
     comparison = compare(without_supplements(LOG), LOG, CYCLE_TIME, repeats=[LOG])
     assert [judged.quantity for judged in comparison.quantities] == [

@@ -134,6 +134,7 @@ def test_an_unperturbed_twin_with_perfect_instruments_agrees_but_for_the_convert
         Tolerance.GREEN,
         Tolerance.YELLOW,
     }
+    assert comparison.verdict.validated
 
 
 def test_the_toolkit_finds_lag_and_differences_of_the_perturbed_twin(walks: TwoWalks) -> None:
@@ -149,6 +150,7 @@ def test_the_toolkit_finds_lag_and_differences_of_the_perturbed_twin(walks: TwoW
     assert 0.10 < currents.rmae < 0.60
     # Five percent of the battery's voltage, and somewhat more over its resistance.
     assert 0.04 < supply.rmae < 0.10
+    assert not comparison.verdict.validated
 
 
 def test_every_perturbation_reaches_the_twin(walks: TwoWalks) -> None:

@@ -13,8 +13,15 @@ from gaitswarm.cli.output import note
 from gaitswarm.cli.tables import SHORT
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.measurement.measured_log import Quantity
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
-from gaitswarm.sim.validation import Tolerance, amplitude_spectrum, channels_of_link, columns_of
+from gaitswarm.sim.validation import (
+    Tolerance,
+    amplitude_spectrum,
+    channels_of_link,
+    columns_of,
+    phase_means,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +35,7 @@ if TYPE_CHECKING:
         ParameterView,
     )
     from gaitswarm.sim.controllers.surface import Surface
-    from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog, Synchronised
     from gaitswarm.sim.validation import Comparison
 
 _STYLE: Final[dict[Any, Any]] = {
@@ -51,6 +58,9 @@ _BAND: Final = "#9db8d9"
 
 _HIGHEST: Final = 20.0
 """Highest frequency of drawn spectra [Hz]; walking is below."""
+
+_PHASES: Final = 100
+"""Parts of the walking cycle in maps."""
 
 _LARGEST: Final = 1.0
 """RMAE at which bars are truncated."""
@@ -253,20 +263,71 @@ def _height(p: ParameterView, value: float | str) -> float:
     return float(names.index(value)) if value in names else -1.0
 
 
-def draw_leg(pair: Synchronised, quantity: Quantity) -> Figure:
-    """Draw time series of the first leg's joints, measured and simulated."""
-    joints = pair.measured.joints[:JOINTS_PER_LEG]
-    figure = _figure(9.0, 6.5)
-    drawn = figure.subplots(len(joints), 1, sharex=True)
+def draw_joints(pair: Synchronised, quantity: Quantity) -> Figure:
+    """Draw time series of every joint, measured and simulated, one row per leg (fig. 2.22)."""
+    legs = pair.measured.legs
+    figure = _figure(12.0, 1.7 * len(legs) + 0.8)
+    drawn = figure.subplots(len(legs), JOINTS_PER_LEG, sharex=True, sharey="col", squeeze=False)
     time = np.arange(len(pair.measured.time)) * CONTROL_PERIOD
-    for axes, joint in zip(drawn, joints, strict=True):
+    for axes, joint in zip(drawn.flat, pair.measured.joints, strict=True):
         for log, colour, label in _both(pair):
-            axes.plot(time, columns_of(log, quantity, [joint]), color=colour, lw=1.0, label=label)
-        axes.set_ylabel(f"{joint}\n[{quantity.unit}]")
-    drawn[0].legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-    drawn[0].set_title(f"{quantity}: {quantity.meaning}")
-    drawn[-1].set_xlabel("time since the first row compared  [s]")
-    drawn[-1].set_xlim(time[0], time[-1])
+            axes.plot(time, columns_of(log, quantity, [joint]), color=colour, lw=0.8, label=label)
+        axes.set_title(joint, size="small", parse_math=False)
+    for axes in drawn[-1]:
+        axes.set_xlabel("time since the first row compared  [s]")
+        axes.set_xlim(time[0], time[-1])
+    handles, labels = drawn[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, ncols=2, loc="upper right")
+    figure.suptitle(f"{quantity}: {quantity.meaning} [{quantity.unit}]", x=0.01, ha="left")
+    return figure
+
+
+def draw_current_maps(pair: Synchronised) -> Figure:
+    """Draw mean currents over phase of the cycle and joint, by link (after figs. 2.17 to 2.21)."""
+    by_link = sorted(pair.measured.joints, key=pair.measured.link_of)
+    maps = {
+        label: phase_means(
+            columns_of(log, Quantity.CURRENT, by_link), pair.cycle_time / CONTROL_PERIOD, _PHASES
+        ).T
+        for log, _, label in _both(pair)
+    }
+    measured, simulated = maps.values()
+    highest = max(measured.max(), simulated.max())
+    figure = _figure(12.0, 1.6 + 0.2 * len(by_link))
+    panels = figure.subplots(1, 3, sharey=True)
+    shown = [(label, currents, "viridis", 0.0, highest) for label, currents in maps.items()]
+    shown.append(("simulated - measured", simulated - measured, "coolwarm", -highest, highest))
+    for axes, (label, values, colours, low, high) in zip(panels, shown, strict=True):
+        extent = (0.0, 1.0, len(by_link) - 0.5, -0.5)
+        style: dict[str, Any] = {"cmap": colours, "vmin": low, "vmax": high, "extent": extent}
+        image = axes.imshow(values, aspect="auto", interpolation="nearest", **style)
+        axes.set_title(label)
+        axes.set_xlabel("phase of the cycle")
+        axes.grid(visible=False)
+        figure.colorbar(image, ax=axes, label="mean current  [A]")
+    panels[0].set_yticks(range(len(by_link)), by_link, size="small", parse_math=False)
+    return figure
+
+
+def draw_battery(pair: Synchronised) -> Figure:
+    """Draw the sum of the motors' currents and the battery's current over time (fig. 2.16)."""
+    figure = _figure(9.0, 4.0)
+    axes = figure.add_subplot()
+    time = np.arange(len(pair.measured.time)) * CONTROL_PERIOD
+    for log, colour, label in _both(pair):
+        axes.plot(time, log.current.sum(axis=1), color=colour, lw=1.0, label=f"motors, {label}")
+        if log.battery_current is not None:
+            of_battery: dict[str, Any] = {
+                "color": colour,
+                "lw": 1.0,
+                "ls": ":",
+                "label": f"battery, {label}",
+            }
+            axes.plot(time, log.battery_current[:, 0], **of_battery)
+    axes.set_xlabel("time since the first row compared  [s]")
+    axes.set_ylabel("current  [A]")
+    axes.set_xlim(time[0], time[-1])
+    axes.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 

@@ -36,16 +36,18 @@ def write_report(
     except OSError as error:
         raise InvalidRequest(f"cannot create {folder}: {error.strerror}", field="report") from error
     pictures.save(pictures.draw_errors(comparison), folder / "rmae.png")
-    pictures.save(pictures.draw_leg(pair, Quantity.JOINT_ANGLE), folder / "angles.png")
-    pictures.save(pictures.draw_leg(pair, Quantity.CURRENT), folder / "currents.png")
+    pictures.save(pictures.draw_joints(pair, Quantity.JOINT_ANGLE), folder / "angles.png")
+    pictures.save(pictures.draw_joints(pair, Quantity.CURRENT), folder / "currents.png")
+    pictures.save(pictures.draw_current_maps(pair), folder / "maps.png")
+    pictures.save(pictures.draw_battery(pair), folder / "battery.png")
     pictures.save(pictures.draw_spectra(pair, Quantity.CURRENT), folder / "spectra.png")
-    text = "\n".join(_lines(comparison, facts, leg=pair.measured.legs[0]))
+    text = "\n".join(_lines(comparison, facts))
     with replacing(folder / REPORT, "report") as file:
         file.write(f"{text}\n".encode())
     return folder / REPORT
 
 
-def _lines(comparison: Comparison, facts: Mapping[str, str], *, leg: str) -> Iterable[str]:
+def _lines(comparison: Comparison, facts: Mapping[str, str]) -> Iterable[str]:
     def picture(heading: str, text: str, file: str) -> list[str]:
         return [f"## {heading}", "", f"![{text}]({file}.png)", ""]
 
@@ -72,8 +74,11 @@ def _lines(comparison: Comparison, facts: Mapping[str, str], *, leg: str) -> Ite
         for agreement in (*judged.links, judged.whole)
     )
     yield ""
-    yield from picture(f"Joint angles of {leg}", "Joint angles over time", "angles")
-    yield from picture(f"Motor currents of {leg}", "Motor currents over time", "currents")
+    yield from picture("Joint angles", "Joint angles over time", "angles")
+    yield from picture("Motor currents", "Motor currents over time", "currents")
+    yield from picture("Motor currents over the cycle", "Current by joint and phase", "maps")
+    yield from picture("Battery", "Sum of motor currents, and current of the battery", "battery")
+    yield from (battery(comparison), "")
     yield from ("## Spectra of the motor currents", "")
     spectra = comparison.quantity(Quantity.CURRENT).spectra
     yield from _table(
@@ -162,6 +167,24 @@ def verdict_lines(verdict: Verdict) -> Iterator[str]:
         if not gate.passed:
             end = " (a digital signal: this ends it)" if gate.quantity.digital else ""
             yield f"{gate.quantity} failed{end}: {gate.reason}"
+
+
+def battery(comparison: Comparison) -> str:
+    """Describe the sum of the motors' currents, and the battery's current."""
+    motors = comparison.battery.motors
+
+    def part(name: str, summed: float, against: Agreement | None) -> str:
+        drawn = (
+            "" if against is None else f", {against.mean_absolute_measured:.4g} A of the battery"
+        )
+        return f"{name} {summed:.4g} A{drawn}"
+
+    return (
+        "sum of the motors' currents, mean: "
+        f"{part('measured', motors.mean_absolute_measured, comparison.battery.measured)};"
+        f" {part('simulated', motors.mean_absolute_simulated, comparison.battery.simulated)};"
+        f" RMAE of the sum {percent(motors.rmae)}"
+    )
 
 
 def confidence_table(comparison: Comparison) -> Table:

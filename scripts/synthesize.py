@@ -101,6 +101,8 @@ class Instruments(BaseModel):
     supply_noise: float = Field(default=0.03, ge=0.0, description="[V]")
     potentiometer_noise: float = Field(default=0.005, ge=0.0, description="[rad]")
     acceleration_noise: float = Field(default=0.005, ge=0.0, description="[g]")
+    rate_noise: float = Field(default=0.01, ge=0.0, description="gyroscope [rad/s]")
+    battery_noise: float = Field(default=0.05, ge=0.0, description="current of the battery [A]")
     lead: float = Field(
         default=0.124, ge=0.0, le=10.0, description="standing logged before the walk begins [s]"
     )
@@ -250,6 +252,8 @@ def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) ->
         potentiometer_joints=tuple(with_potentiometer),
         potentiometer=noisy(Quantity.POTENTIOMETER, errors.potentiometer_noise)[:, columns],
         body_acceleration=noisy(Quantity.BODY_ACCELERATION, errors.acceleration_noise),
+        body_rate=noisy(Quantity.BODY_RATE, errors.rate_noise),
+        battery_current=noisy(Quantity.BATTERY_CURRENT, errors.battery_noise),
     )
 
 

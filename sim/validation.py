@@ -103,6 +103,14 @@ def spectral_error(measured: Floats, simulated: Floats, timestep: float) -> floa
     return _ratio(error, scale)
 
 
+def phase_means(signal: Floats, cycle_rows: float, bins: int) -> Floats:
+    """Return the means (bins, C) of a signal (T, C) over equal parts of the walking cycle."""
+    place = (np.arange(len(signal)) % cycle_rows * (bins / cycle_rows)).astype(np.int64)
+    total = np.zeros((bins, signal.shape[1]))
+    np.add.at(total, place, signal)
+    return total / np.bincount(place, minlength=bins)[:, None]
+
+
 def _relative(error: float, measured: Floats) -> float:
     return _ratio(error, mean_absolute(measured))
 
@@ -217,6 +225,18 @@ class QuantityComparison(_Data):
     spectra: tuple[Harmonics, ...] = Field(default=(), description="of currents, by link")
 
 
+class BatteryComparison(_Data):
+    """The sum of the absolute motor currents, and the battery's current (fig. 2.16)."""
+
+    motors: Agreement = Field(description="The measured and the simulated sum.")
+    measured: Agreement | None = Field(
+        description="The battery's current and the motors' sum, both measured; null without `I_B`."
+    )
+    simulated: Agreement | None = Field(
+        description="The battery's current and the motors' sum, both simulated."
+    )
+
+
 class Gate(_Data):
     """A quantity's part in the verdict."""
 
@@ -248,6 +268,7 @@ class Comparison(_Data):
     repeats: int = Field(description="further measurements, for CONF")
     synthetic: bool = Field(description="whether the measured log was computed, as it says")
     quantities: tuple[QuantityComparison, ...]
+    battery: BatteryComparison
     verdict: Verdict
 
     def quantity(self, quantity: Quantity) -> QuantityComparison:
@@ -283,7 +304,22 @@ def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()
         repeats=len(repeats),
         synthetic=pair.measured.synthetic,
         quantities=quantities,
+        battery=_battery(pair),
         verdict=_verdict(quantities),
+    )
+
+
+def _battery(pair: Synchronised) -> BatteryComparison:
+    def against_battery(log: MeasuredLog) -> Agreement | None:
+        if log.battery_current is None:
+            return None
+        return _agreement("battery", log.battery_current[:, 0], log.current.sum(axis=1), [])
+
+    measured, simulated = (log.current.sum(axis=1) for log in (pair.measured, pair.simulated))
+    return BatteryComparison(
+        motors=_agreement("motors", measured, simulated, []),
+        measured=against_battery(pair.measured),
+        simulated=against_battery(pair.simulated),
     )
 
 

@@ -339,6 +339,7 @@ def validate(
     """Simulate a measured walk, classify the differences by tolerance, and give a verdict."""
     from gaitswarm.cli.validation import (
         alignment,
+        battery,
         comparison_table,
         confidence_table,
         remarks,
@@ -368,6 +369,7 @@ def validate(
         yield comparison_table(comparison)
         if comparison.repeats:
             yield confidence_table(comparison)
+        yield battery(comparison)
         yield alignment(comparison)
         yield from verdict_lines(comparison.verdict)
 

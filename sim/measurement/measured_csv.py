@@ -6,8 +6,8 @@
     0.0,0.3217,...
 
 Lines before the headings that begin with `#` are comments; `# key: value` is kept as metadata.
-Columns may have any order. q_POT is optional for any joint, a_BODY for all axes together; all other
-quantities are required for every joint and leg of the robot.
+Columns may have any order. q_POT is optional for any joint, a_BODY and w_BODY for all axes
+together, I_B for the battery; all other quantities are required for every joint and leg.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError
-from gaitswarm.sim.measurement.measured_log import AXES, MeasuredLog, Quantity
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, channels_by_kind
 from gaitswarm.sim.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -134,11 +134,7 @@ def _cells(line: str, number: int) -> list[str]:
 
 def _expected(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
     """Possible channels of each quantity."""
-    channels = {
-        "joint": robot.joint_names,
-        "leg": tuple(leg.name for leg in robot.legs),
-        "axis": AXES,
-    }
+    channels = channels_by_kind(robot.joint_names, tuple(leg.name for leg in robot.legs))
     return {quantity: channels[quantity.per] for quantity in Quantity}
 
 
@@ -177,7 +173,7 @@ def _places(
     for quantity, channels in expected.items():
         names = {channel: f"{quantity}.{channel}" for channel in channels}
         present = {c: column_of[name] for c, name in names.items() if name in column_of}
-        partly = quantity is Quantity.BODY_ACCELERATION and present
+        partly = quantity.per == "axis" and present
         if partly or not quantity.optional:
             for channel in channels:
                 if channel not in present:

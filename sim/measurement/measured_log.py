@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 AXES: Final = ("x", "y", "z")
 """Of the body: forward, left, up."""
 
+BATTERY: Final = ("battery",)
+
 ORIGIN: Final = "origin"
 SYNTHETIC: Final = "synthetic"
 """Value of `ORIGIN` in the metadata of a log that was computed instead of measured."""
@@ -36,7 +38,7 @@ class Quantity(StrEnum):
     """A row of table 2.2, by its symbol."""
 
     unit: str
-    per: Literal["joint", "leg", "axis"]  # each of which has one channel
+    per: Literal["joint", "leg", "axis", "battery"]  # each of which has one channel
     column: str  # attribute of `MeasuredLog`
     meaning: str  # for headings and documentation
 
@@ -53,9 +55,16 @@ class Quantity(StrEnum):
         "body_acceleration",
         "acceleration of the body, without gravity",
     )
+    BODY_RATE = "w_BODY", "rad/s", "axis", "body_rate", "angular rate of the body by the gyroscope"
+    BATTERY_CURRENT = "I_B", "A", "battery", "battery_current", "current of the battery"
 
     def __new__(
-        cls, symbol: str, unit: str, per: Literal["joint", "leg", "axis"], column: str, meaning: str
+        cls,
+        symbol: str,
+        unit: str,
+        per: Literal["joint", "leg", "axis", "battery"],
+        column: str,
+        meaning: str,
     ) -> Self:
         quantity = str.__new__(cls, symbol)
         quantity._value_ = symbol
@@ -70,8 +79,19 @@ class Quantity(StrEnum):
 
     @property
     def optional(self) -> bool:
-        """Whether it is supplementary in table 2.2."""
-        return self in (Quantity.POTENTIOMETER, Quantity.BODY_ACCELERATION)
+        """Whether it is supplementary in table 2.2, or not in it."""
+        return self in (
+            Quantity.POTENTIOMETER,
+            Quantity.BODY_ACCELERATION,
+            Quantity.BODY_RATE,
+            Quantity.BATTERY_CURRENT,
+        )
+
+
+def channels_by_kind(
+    joints: tuple[str, ...], legs: tuple[str, ...]
+) -> dict[Literal["joint", "leg", "axis", "battery"], tuple[str, ...]]:
+    return {"joint": joints, "leg": legs, "axis": AXES, "battery": BATTERY}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +112,8 @@ class MeasuredLog:
         potentiometer_joints: names of the K joints with a potentiometer.
         potentiometer: (T, K) [rad]; None if K is 0.
         body_acceleration: in the body's frame, without gravity, (T, 3) [g]; None if not measured.
+        body_rate: in the body's frame, (T, 3) [rad/s]; None if not measured.
+        battery_current: discharging is positive, (T, 1) [A]; None if not measured.
         metadata: of the file, by name.
     """
 
@@ -106,6 +128,8 @@ class MeasuredLog:
     potentiometer_joints: tuple[str, ...] = ()
     potentiometer: Floats | None = None
     body_acceleration: Floats | None = None
+    body_rate: Floats | None = None
+    battery_current: Floats | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -132,9 +156,9 @@ class MeasuredLog:
     def channels(self, quantity: Quantity) -> tuple[str, ...]:
         if quantity is Quantity.POTENTIOMETER:
             return self.potentiometer_joints
-        if quantity is Quantity.BODY_ACCELERATION and self.body_acceleration is None:
+        if getattr(self, quantity.column) is None:
             return ()
-        return {"joint": self.joints, "leg": self.legs, "axis": AXES}[quantity.per]
+        return channels_by_kind(self.joints, self.legs)[quantity.per]
 
     def values(self, quantity: Quantity) -> Floats:
         """A quantity's columns (T, channels), in its unit."""
@@ -162,7 +186,8 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
     """A simulated walk as logged by the robot's instruments, without their errors.
 
     Encoders see the motors' angles, potentiometers, here on every joint, those of the links;
-    currents are those of `sensed_currents`; the boards of all legs see the one battery.
+    currents are those of `sensed_currents`; the boards of all legs see the one battery, whose
+    current follows from the motors' power, which the bridges conserve.
     """
     if not np.isfinite(walk.current).all():
         raise SimulationInputError("a walk that ended early cannot be compared")
@@ -179,6 +204,8 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
         potentiometer_joints=joints,
         potentiometer=walk.joint_angle,
         body_acceleration=walk.body_acceleration() / GRAVITY,
+        body_rate=walk.base_velocity[:, 3:],
+        battery_current=((walk.voltage * walk.current).sum(axis=1) / walk.supply)[:, None],
         metadata={ORIGIN: "simulated", "robot": robot.description.name},
     )
 

@@ -60,6 +60,7 @@ def test_the_table_shows_links_units_and_classes(measured: Path) -> None:
         assert text in shown.out
     assert "0.124 s later" in shown.out
     assert "not validated; passed: q_D\nU_P failed (a digital signal: this ends it)" in shown.out
+    assert "A of the battery" in shown.out
     assert "SYNTHETIC" in shown.err
 
 
@@ -87,7 +88,7 @@ def test_the_report_has_tables_and_pictures(measured: Path, tmp_path: Path) -> N
     done = validate(measured, "--report", folder)
     assert done.code == 0, done.err
     text = (folder / "report.md").read_text(encoding="utf-8")
-    pictures = {"rmae.png", "angles.png", "currents.png", "spectra.png"}
+    pictures = {"rmae.png", "angles.png", "currents.png", "spectra.png", "maps.png", "battery.png"}
     assert {path.name for path in folder.iterdir()} == pictures | {"report.md"}
     for name in pictures:
         assert f"]({name})" in text

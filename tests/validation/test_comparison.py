@@ -125,6 +125,23 @@ def test_potentiometers_are_compared_by_joint_whatever_joints_have_one() -> None
     assert judged.whole.rmae == 0.0
 
 
+def test_the_sum_of_motor_currents_is_compared_with_the_batterys() -> None:
+    battery = compare(LOG, replace(LOG, current=0.9 * LOG.current), CYCLE_TIME).battery
+    assert battery.motors.rmae == pytest.approx(0.1)
+    assert battery.measured is not None and battery.simulated is not None
+    assert battery.measured.rmae == pytest.approx(0.25)
+    assert battery.simulated.rmae == pytest.approx(0.125)
+    assert compare(without_supplements(LOG), LOG, CYCLE_TIME).battery.measured is None
+
+
+def test_means_by_phase_are_those_of_every_cycle() -> None:
+    rows = np.arange(30)
+    signal = np.column_stack([rows % 10, rows % 10 == 3]).astype(np.float64)
+    means = measures.phase_means(signal, 10.0, 5)
+    np.testing.assert_allclose(means[:, 0], [0.5, 2.5, 4.5, 6.5, 8.5])
+    np.testing.assert_allclose(means[:, 1], [0.0, 0.5, 0.0, 0.0, 0.0])
+
+
 def test_infinite_errors_are_null_in_json() -> None:
     silent = replace(LOG, supply=np.zeros_like(LOG.supply))
     text = compare(silent, LOG, CYCLE_TIME).model_dump_json()

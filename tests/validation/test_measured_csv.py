@@ -55,9 +55,11 @@ def test_every_heading_has_its_unit() -> None:
         "U_S.left_rear [V]",
         "q_POT.right_middle_coxa [rad]",
         "a_BODY.z [g]",
+        "w_BODY.x [rad/s]",
+        "I_B.battery [A]",
     ):
         assert heading in head.split(",")
-    assert len(head.split(",")) == 1 + 4 * 18 + 6 + 6 + 3
+    assert len(head.split(",")) == 1 + 4 * 18 + 6 + 6 + 3 + 3 + 1
 
 
 def test_columns_may_stand_in_any_order_and_editors_may_add_their_marks() -> None:
@@ -114,6 +116,7 @@ CURRENT = "I_M.left_rear_tibia [A]"
         (drop_column(ANGLE), 3, ANGLE, "missing"),
         (drop_column("time [s]"), 3, "time [s]", "missing"),
         (drop_column("a_BODY.y [g]"), 3, "a_BODY.y [g]", "missing"),
+        (drop_column("w_BODY.x [rad/s]"), 3, "w_BODY.x [rad/s]", "missing"),
         (drop_column("U_S.right_rear [V]"), 3, "U_S.right_rear [V]", "missing"),
         (replace_cell(9, CURRENT, "nan"), 9, CURRENT, "nan is not a finite"),
         (replace_cell(9, CURRENT, "inf"), 9, CURRENT, "inf is not a finite"),
@@ -121,7 +124,7 @@ CURRENT = "I_M.left_rear_tibia [A]"
         (replace_cell(9, CURRENT, "much"), 9, CURRENT, "'much' is not a number"),
         (replace_cell(9, CURRENT, ""), 9, CURRENT, "'' is not a number"),
         (replace_cell(9, CURRENT, "1_0"), 9, CURRENT, "'1_0' is not a number"),
-        (replace_cell(9, CURRENT, "0.1,0.2"), 9, None, "89 values for the 88 columns"),
+        (replace_cell(9, CURRENT, "0.1,0.2"), 9, None, "93 values for the 92 columns"),
         (replace_cell(9, "time [s]", "0.7"), 9, "time [s]", "0.002 s apart"),
         (drop_lines(9, 9), 9, "time [s]", "0.004 s after"),
         (drop_lines(50, ROWS + 3), 49, None, "46 rows; at least 100"),

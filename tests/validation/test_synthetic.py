@@ -29,6 +29,8 @@ PERFECT = Instruments(
     supply_noise=0.0,
     potentiometer_noise=0.0,
     acceleration_noise=0.0,
+    rate_noise=0.0,
+    battery_noise=0.0,
     lead=0.0,
     clock_offset=0.0,
 )
@@ -39,8 +41,19 @@ def test_a_simulated_walk_has_every_quantity_in_its_unit(walks: TwoWalks) -> Non
     np.testing.assert_array_equal(log.current, np.abs(walk.current))
     np.testing.assert_array_equal(log.control_voltage, walk.voltage)
     np.testing.assert_array_equal(log.supply, np.repeat(walk.supply[:, None], 6, axis=1))
+    np.testing.assert_array_equal(log.body_rate, walk.base_velocity[:, 3:])
     assert log.joints == walks.robot.joint_names
     assert not log.synthetic
+
+
+def test_the_batterys_current_is_its_voltages_drop_over_its_resistance(walks: TwoWalks) -> None:
+    supply = walks.robot.description.supply
+    assert walks.simulated.battery_current is not None
+    np.testing.assert_allclose(
+        walks.simulated.battery_current[:, 0],
+        (supply.voltage - walks.walk.supply) / supply.resistance,
+        atol=1e-9,
+    )
 
 
 def test_backlash_shows_between_encoder_and_potentiometer(walks: TwoWalks) -> None:
@@ -106,6 +119,8 @@ def test_another_seed_changes_the_noise_alone(walks: TwoWalks) -> None:
                 Quantity.SUPPLY,
                 Quantity.POTENTIOMETER,
                 Quantity.BODY_ACCELERATION,
+                Quantity.BODY_RATE,
+                Quantity.BATTERY_CURRENT,
             )
         )
 

@@ -47,9 +47,18 @@ def walking_log(robot: Robot, *, rows: int = 3 * CYCLE, standing: int = 0) -> Me
         potentiometer_joints=robot.joint_names[:3] + robot.joint_names[6:9],
         potentiometer=swing[:, [0, 1, 2, 6, 7, 8]],
         body_acceleration=0.1 * swing[:, :3],
+        body_rate=0.2 * swing[:, 3:6],
+        battery_current=0.8 * np.abs(swing).sum(axis=1, keepdims=True),
         metadata={"robot": robot.description.name},
     )
 
 
 def without_supplements(log: MeasuredLog) -> MeasuredLog:
-    return replace(log, potentiometer_joints=(), potentiometer=None, body_acceleration=None)
+    return replace(
+        log,
+        potentiometer_joints=(),
+        potentiometer=None,
+        body_acceleration=None,
+        body_rate=None,
+        battery_current=None,
+    )

@@ -167,8 +167,7 @@ def test_resumed_job_equals_one_never_killed(
 
 
 @pytest.mark.thorough(
-    "test_resumed_job_equals_one_never_killed",
-    "test_another_process_continues_with_the_same_bits, for all methods",
+    "test_resumed_job_equals_one_never_killed, for all methods",
 )
 def test_a_job_of_any_method_killed_in_its_middle_equals_one_never_killed(
     store: Store, url: str, evaluator: Evaluator

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -74,15 +75,23 @@ _COLOURS: Final = {
 }
 
 
+@contextmanager
+def _styled() -> Iterator[None]:
+    """Draw in our style, and leave that of other figures in the process."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_STYLE):
+        yield
+
+
 def _figure(width: float, height: float) -> Figure:
     """Return a figure of a size [inch]."""
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    mpl.rcParams.update(_STYLE)
     return Figure(figsize=(width, height))
 
 
+@_styled()
 def draw_surface(surface: Surface, *, title: str) -> Figure:
     """Draw the output over angle error and motor current, from the robot's lookup table."""
     from matplotlib.ticker import MaxNLocator
@@ -132,6 +141,7 @@ _ACROSS: Final = {"from the side": (0, 2), "from above": (0, 1)}
 """Coordinates of the body's frame by panel: x forward, y left, z up."""
 
 
+@_styled()
 def draw_robot(view: RobotCheckView) -> Figure:
     """Draw legs, feet, centre of mass, ground, and the support polygon."""
     figure = _figure(9.0, 4.5)
@@ -180,6 +190,7 @@ def _around(points: np.ndarray) -> list[int]:
         return [int(points[:, 0].argmin()), int(points[:, 0].argmax())]
 
 
+@_styled()
 def draw_front(view: FrontView, *, title: str) -> Figure:
     """Draw the front in every pair of objectives, with knees and winners under A, B and C."""
     names = [objective.name for objective in view.objectives]
@@ -225,6 +236,7 @@ def _draw_pair(axes: Axes, view: FrontView, horizontal: str, vertical: str) -> N
         axis.set_minor_formatter(NullFormatter())
 
 
+@_styled()
 def draw_parameters(view: IdentifiabilityView, truth: Mapping[str, float]) -> Figure:
     """Draw one panel per parameter: its interval against the threshold (fig. 2.14)."""
     columns = min(len(view.parameters), 6)
@@ -263,6 +275,7 @@ def _height(p: ParameterView, value: float | str) -> float:
     return float(names.index(value)) if value in names else -1.0
 
 
+@_styled()
 def draw_joints(pair: Synchronised, quantity: Quantity) -> Figure:
     """Draw time series of every joint, measured and simulated, one row per leg (fig. 2.22)."""
     legs = pair.measured.legs
@@ -282,6 +295,7 @@ def draw_joints(pair: Synchronised, quantity: Quantity) -> Figure:
     return figure
 
 
+@_styled()
 def draw_current_maps(pair: Synchronised) -> Figure:
     """Draw mean currents over phase of the cycle and joint, by link (after figs. 2.17 to 2.21)."""
     by_link = sorted(pair.measured.joints, key=pair.measured.link_of)
@@ -309,6 +323,7 @@ def draw_current_maps(pair: Synchronised) -> Figure:
     return figure
 
 
+@_styled()
 def draw_battery(pair: Synchronised) -> Figure:
     """Draw the sum of the motors' currents and the battery's current over time (fig. 2.16)."""
     figure = _figure(9.0, 4.0)
@@ -331,6 +346,7 @@ def draw_battery(pair: Synchronised) -> Figure:
     return figure
 
 
+@_styled()
 def draw_spectra(pair: Synchronised, quantity: Quantity) -> Figure:
     """Draw amplitude spectra by link, averaged over its joints, without the mean value."""
     figure = _figure(9.0, 6.5)
@@ -352,6 +368,7 @@ def draw_spectra(pair: Synchronised, quantity: Quantity) -> Figure:
     return figure
 
 
+@_styled()
 def draw_errors(comparison: Comparison) -> Figure:
     """Draw the RMAE of every quantity and link in the colours of the tolerance classes."""
     from matplotlib.patches import Patch

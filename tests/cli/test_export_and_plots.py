@@ -97,6 +97,19 @@ def test_the_surface_of_a_fuzzy_design_is_drawn_with_units(
 
 
 @pytest.mark.slow
+def test_a_picture_leaves_the_style_of_later_figures_as_it_was(
+    gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
+) -> None:
+    convergence = [tmp_path / "before.png", tmp_path / "after.png"]
+    for path in convergence:
+        drawn = gaitswarm("plot", "convergence", finished.id, "-o", path, "--db", finished.db)
+        assert drawn.code == 0, drawn.err
+        assert gaitswarm("plot", "surface", "-o", tmp_path / "surface.png").code == 0
+    before, after = (path.read_bytes() for path in convergence)
+    assert before == after
+
+
+@pytest.mark.slow
 def test_pictures_are_png_svg_or_pdf(
     gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
 ) -> None:

@@ -9,7 +9,7 @@ parameters, whose true values are known here; they say nothing about the accurac
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
@@ -27,6 +27,7 @@ from gaitswarm.cli.output import note
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.measurement.measured_binary import format_mcap, format_npz
 from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import (
     ORIGIN,
@@ -265,7 +266,7 @@ def converted(amperes: Floats, step: float) -> Floats:
 def synthesize(
     options: WalkOptions,
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE.csv", help="Where to write the log.")
+        Path, typer.Option("--output", "-o", metavar="FILE", help="Where to write the log.")
     ],
     seed: Annotated[
         int, typer.Option(min=0, max=(1 << 64) - 1, help="Seed of the sensor noise.")
@@ -281,8 +282,13 @@ def synthesize(
     place: Place,
 ) -> None:
     """Write a SYNTHETIC log of a perturbed twin of the robot with sensor noise, for tests."""
-    if output.suffix != ".csv":
-        raise InvalidRequest(f"{output} must end in .csv", field="output")
+    formats: dict[str, Callable[[MeasuredLog], bytes]] = {
+        ".csv": lambda log: format_measured_log(log).encode(),
+        ".npz": format_npz,
+        ".mcap": format_mcap,
+    }
+    if output.suffix not in formats:
+        raise InvalidRequest(f"{output} must end in {', '.join(formats)}", field="output")
     walk = options.read(place)
     twin = None
     if parameters is not None:
@@ -296,7 +302,7 @@ def synthesize(
         walk.robot, walk.scenario, walk.controller, walk.design, seed=seed, perturbation=twin
     )
     with replacing(output, "output") as file:
-        file.write(format_measured_log(log).encode())
+        file.write(formats[output.suffix](log))
     note(f"SYNTHETIC log of {len(log.time)} rows written to {output}")
 
 

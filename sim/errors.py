@@ -62,10 +62,18 @@ class BeyondJointLimit(SimulationInputError):
 class MeasuredLogError(SimulationInputError):
     """A measured log that cannot be read or compared."""
 
-    def __init__(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+    def __init__(
+        self,
+        problem: str,
+        *,
+        line: int | None = None,
+        row: int | None = None,
+        column: str | None = None,
+    ) -> None:
+        self.problem = problem
         self.line = line
         self.column = column
-        where = [] if line is None else [f"line {line}"]
+        where = [f"{name} {n}" for name, n in (("line", line), ("row", row)) if n is not None]
         where += [] if column is None else [f"column '{column}'"]
         super().__init__(": ".join([*([", ".join(where)] if where else []), problem]))
 

@@ -84,7 +84,8 @@ class WalkOptions:
 
 
 Measured = Annotated[
-    Path, typer.Argument(metavar="MEASURED.csv", help="Log in the format of docs/validation.md.")
+    Path,
+    typer.Argument(metavar="MEASURED", help="Log, .csv, .npz or .mcap, as in docs/validation.md."),
 ]
 
 
@@ -102,8 +103,9 @@ def synchronised(
 
 
 def read_measured(path: Path, robot: Robot) -> MeasuredLog:
-    """Read a log; errors name file, line, column and unit."""
+    """Read a log; errors name file, line or row, column and unit."""
     from gaitswarm.sim.errors import MeasuredLogError
+    from gaitswarm.sim.measurement.measured_binary import parse_mcap, parse_npz
     from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 
     try:
@@ -113,8 +115,9 @@ def read_measured(path: Path, robot: Robot) -> MeasuredLog:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="measured") from error
     if len(content) > LARGEST_FILE:
         raise InvalidRequest(f"{path} is larger than {LARGEST_FILE >> 20} MiB", field="measured")
+    parsed = {".npz": parse_npz, ".mcap": parse_mcap}.get(path.suffix.lower())
     try:
-        return parse_measured_log(content.decode("utf-8"), robot)
+        return parsed(content, robot) if parsed else parse_measured_log(content.decode(), robot)
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InvalidRequest(f"{path}: line {line}: not UTF-8 text", field="measured") from error
@@ -326,7 +329,7 @@ def validate(
     repeat: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE.csv", help="Another measurement of the same walk, for CONF; repeatable."
+            metavar="FILE", help="Another measurement of the same walk, for CONF; repeatable."
         ),
     ] = None,
     report: Annotated[

@@ -15,7 +15,7 @@ from __future__ import annotations
 import csv
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Final
 
@@ -46,9 +46,51 @@ _HEADING: Final = re.compile(r"^(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])
 def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), start=1)
     metadata, head_line, headings = _head(lines)
-    expected = _expected(robot)
-    places = _places(headings, expected, head_line)
+    places = _places(headings, robot, head_line)
     values, line_of = _values(lines, headings, head_line)
+    return _checked(robot, metadata, headings, places, values, line_of, head_line)
+
+
+def log_of_columns(
+    columns: Mapping[str, Floats], metadata: Mapping[str, str], robot: Robot
+) -> MeasuredLog:
+    """Return the log with these columns (T,) by heading; errors name rows from 1."""
+    try:
+        headings = list(columns)
+        places = _places(headings, robot, None)
+        values = np.column_stack(list(columns.values()))
+        rows = range(1, len(values) + 1)
+        return _checked(robot, dict(metadata), headings, places, values, rows, None)
+    except MeasuredLogError as error:
+        raise MeasuredLogError(error.problem, row=error.line, column=error.column) from error
+
+
+def columns_of_log(log: MeasuredLog) -> dict[str, Floats]:
+    """Return the columns (T,) of a log by heading."""
+    return {TIME: log.time} | {
+        heading(quantity, channel): column
+        for quantity in Quantity
+        for channel, column in zip(log.channels(quantity), log.values(quantity).T, strict=True)
+    }
+
+
+def _checked(
+    robot: Robot,
+    metadata: dict[str, str],
+    headings: list[str],
+    places: dict[Quantity, dict[str, int]],
+    values: Floats,
+    line_of: Sequence[int],
+    head_line: int | None,
+) -> MeasuredLog:
+    finite = np.isfinite(values)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise MeasuredLogError(
+            f"{values[row, column]} is not a finite number",
+            line=line_of[row],
+            column=headings[column],
+        )
     if len(values) < MIN_ROWS:
         raise MeasuredLogError(
             f"{len(values)} rows; at least {MIN_ROWS} are required, of {CONTROL_PERIOD:g} s each",
@@ -78,17 +120,13 @@ def format_measured_log(log: MeasuredLog) -> str:
     for key, value in log.metadata.items():
         if not _is_remark(key, value):
             raise MeasuredLogError(f"metadata {key!r}: {value!r} is not one printable line")
-    headings = [TIME]
-    columns = [log.time[:, None]]
-    for quantity in Quantity:
-        headings += [heading(quantity, channel) for channel in log.channels(quantity)]
-        columns.append(log.values(quantity))
-    rows = np.concatenate(columns, axis=1).tolist()
+    columns = columns_of_log(log)
+    rows = np.column_stack(list(columns.values())).tolist()
     return "\n".join(
         [
             f"# {TITLE}",
             *(f"# {key}: {value}" for key, value in log.metadata.items()),
-            ",".join(headings),
+            ",".join(columns),
             *(",".join(map(repr, row)) for row in rows),
             "",
         ]
@@ -132,16 +170,15 @@ def _cells(line: str, number: int) -> list[str]:
         raise MeasuredLogError(f"no headings: {error}", line=number) from error
 
 
-def _expected(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
+def expected_channels(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
     """Possible channels of each quantity."""
     channels = channels_by_kind(robot.joint_names, tuple(leg.name for leg in robot.legs))
     return {quantity: channels[quantity.per] for quantity in Quantity}
 
 
-def _places(
-    headings: list[str], expected: dict[Quantity, tuple[str, ...]], line: int
-) -> dict[Quantity, dict[str, int]]:
+def _places(headings: list[str], robot: Robot, line: int | None) -> dict[Quantity, dict[str, int]]:
     """Column of every channel present, in the robot's order."""
+    expected = expected_channels(robot)
     units = {"time": "s"} | {
         f"{quantity}.{channel}": quantity.unit
         for quantity, channels in expected.items()
@@ -206,16 +243,7 @@ def _values(
         except ValueError:
             raise _not_a_number(cells, headings, number) from None
         line_of.append(number)
-    values = np.array(numbers, dtype=np.float64).reshape(-1, len(headings))
-    finite = np.isfinite(values)
-    if not finite.all():
-        row, column = np.argwhere(~finite)[0]
-        raise MeasuredLogError(
-            f"{values[row, column]} is not a finite number",
-            line=line_of[row],
-            column=headings[column],
-        )
-    return values, line_of
+    return np.array(numbers, dtype=np.float64).reshape(-1, len(headings)), line_of
 
 
 def _not_a_number(cells: list[str], headings: list[str], line: int) -> MeasuredLogError:
@@ -228,7 +256,7 @@ def _not_a_number(cells: list[str], headings: list[str], line: int) -> MeasuredL
     return MeasuredLogError("not numbers", line=line)
 
 
-def _check_time(time: Floats, line_of: list[int]) -> None:
+def _check_time(time: Floats, line_of: Sequence[int]) -> None:
     steps = np.diff(time)
     wrong = np.flatnonzero(np.abs(steps - CONTROL_PERIOD) > _JITTER)
     if wrong.size:
@@ -241,7 +269,7 @@ def _check_time(time: Floats, line_of: list[int]) -> None:
 
 
 def _check_currents(
-    values: Floats, places: dict[Quantity, dict[str, int]], line_of: list[int]
+    values: Floats, places: dict[Quantity, dict[str, int]], line_of: Sequence[int]
 ) -> None:
     for channel, column in places[Quantity.CURRENT].items():
         negative = np.flatnonzero(values[:, column] < 0.0)

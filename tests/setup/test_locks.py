@@ -46,7 +46,8 @@ def test_locks_pin_all_that_is_asked_for() -> None:
     assert asked - set(run) == set()
     engines = {_name(r) for r in extras["mujoco"]}
     development |= {_name(r) for r in PROJECT["dependency-groups"]["manual"]}
-    assert (asked | development | engines) - set(dev) == set()
+    logs = {_name(r) for r in extras["mcap"]}
+    assert (asked | development | engines | logs) - set(dev) == set()
     assert (asked | engines | {_name(r) for r in extras["cluster"]}) - set(image) == set()
     for group in ("manual", "node", "installer", "robots"):
         wanted = {_name(r) for r in PROJECT["dependency-groups"][group]}

@@ -36,6 +36,9 @@ def test_synthesize_writes_the_log_of_the_seed(walks: TwoWalks, tmp_path: Path) 
     assert done.code == 0, done.err
     assert path.read_text(encoding="utf-8") == walks.text
     assert "SYNTHETIC" in done.err
+    packed = tmp_path / "made.npz"
+    assert synthesize(*WALK, "--seed", 7, "-o", packed).code == 0
+    assert validate(packed, "--json").json == validate(path, "--json").json
 
 
 def test_the_robot_of_a_log_is_that_of_its_validation_by_default(tmp_path: Path) -> None:

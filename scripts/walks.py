@@ -56,7 +56,7 @@ def main() -> None:
     published = gaitswarm.CONTROLLERS["fuzzy-pi"].published["A"]
     with tempfile.TemporaryDirectory() as folder:
         database = str(Path(folder, "jobs.db"))
-        run = gaitswarm.optimize(preference="A", particles=25, iterations=25, seed=1, db=database)
+        run = gaitswarm.optimize(preference="A", particles=25, iterations=25, seed=2, db=database)
     walks = {
         "published": ("published optimum A", published),
         "found": ("found in 625 simulated designs", run.best.design),

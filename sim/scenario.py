@@ -138,7 +138,7 @@ class Scenario(BaseModel):
         description="Length of a foot's stroke on the ground [m].",
     )
     height: float = Field(
-        default=0.04,
+        default=0.043,
         ge=0.0,
         le=0.5,
         description="Height of the swing [m].",
@@ -195,8 +195,8 @@ class Scenario(BaseModel):
         description="Rate at which the desired angles are updated [Hz].",
     )
     curve: CurveName = Field(
-        default="quadratic_spline",
-        description="Shape of the swing; the spline is that of appendix .2.1.",
+        default="half_ellipse",
+        description="Shape of the swing; the spline is that of the drive of 2011 (appendix .2.1).",
     )
     sway_lateral: float = Field(
         default=0.0,

@@ -22,6 +22,8 @@ from gaitswarm_research.reconstruction.optimality import OPTIMA, optimality, ran
 from gaitswarm_research.reconstruction.targets import Size, calibrations
 from research.tests.conftest import Command
 
+MODEL_PAGE = Path(__file__).parents[2] / "docs" / "model.md"
+
 TINY = (
     *("--seeds", "2", "--particles", "2", "--iterations", "1", "--samples", "2"),
     *("--change", "integrator_unit"),
@@ -29,6 +31,7 @@ TINY = (
 
 SECTIONS = [
     "Summary",
+    "Deviations from print",
     "Printed against simulated",
     "Optima among random designs",
     "Misfit by choice",
@@ -68,6 +71,12 @@ def test_the_command_reports_and_computes_nothing_twice(
         assert len(list(jobs.jobs())) == 2
     assert (folder / "report.md").read_text(encoding="utf-8") == report
     assert (folder / "optimality.json").stat().st_mtime_ns == stored.st_mtime_ns
+
+
+def test_the_page_of_the_model_has_the_deviations_from_print(research: Command) -> None:
+    printed = research("reconstruction", "--deviations")
+    assert printed.code == 0, printed.err
+    assert printed.out in MODEL_PAGE.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Foot curve with a straight support phase and a half-ellipse as swing (table 3.2)."""
+"""Foot curve with a straight support phase and a half-ellipse as swing (3.1.4, fig. 4.1)."""
 
 from __future__ import annotations
 

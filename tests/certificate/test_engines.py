@@ -152,7 +152,7 @@ def test_under_the_runner_our_rows_have_the_bits_of_a_certificate_without_engine
     found = certificate("job", spec, walked[-1])
     objectives = found.engines["mujoco"].scenarios["short"].objectives
     objectives.pop("height_loss")
-    assert max(abs(compared.difference or 0.0) for compared in objectives.values()) < 0.02
+    assert max(abs(compared.difference or 0.0) for compared in objectives.values()) < 0.03
 
 
 @pytest.mark.thorough("test_they_are_verified_with_the_job")

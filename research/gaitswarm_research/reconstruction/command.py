@@ -13,6 +13,7 @@ import gaitswarm
 from gaitswarm import InvalidRequest
 from gaitswarm_research import options
 from gaitswarm_research.reconstruction.conventions import alternatives
+from gaitswarm_research.reconstruction.deviations import deviations
 from gaitswarm_research.reconstruction.evidence import gather
 from gaitswarm_research.reconstruction.report import write_report
 from gaitswarm_research.reconstruction.targets import Size, calibrations
@@ -48,6 +49,10 @@ def reconstruction(
             help="Conventions to change one at a time from the default. Default: all.",
         ),
     ] = None,
+    only_deviations: Annotated[
+        bool,
+        typer.Option("--deviations", help="Only compare the default model with print, in seconds."),
+    ] = False,
     db: options.Db = None,
     cpus: options.Cpus = None,
     ray_address: options.RayAddress = None,
@@ -57,6 +62,9 @@ def reconstruction(
     Calibrations are jobs of the database; results of random designs are kept in the output folder.
     Results of the same code are reused, so the same command resumes an interrupted run.
     """
+    if only_deviations:
+        typer.echo(deviations())
+        return
     defaults = (12, 8, 100) if quick else (40, 50, 1000)
     n_particles, n_iterations, n_samples = (
         default if value is None else value

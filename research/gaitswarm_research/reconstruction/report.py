@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from gaitswarm_research.reconstruction.deviations import deviations
 from gaitswarm_research.reconstruction.evidence import PRINTED, Assessment, Evidence
 from gaitswarm_research.reconstruction.optimality import OPTIMA
 from gaitswarm_research.reconstruction.pictures import draw_choices, draw_exclusion, draw_targets
@@ -40,6 +41,7 @@ def _lines(evidence: Evidence) -> Iterator[str]:
     for section in (
         _head,
         _summary,
+        _deviations,
         _targets,
         _optima,
         _choices,
@@ -81,6 +83,14 @@ def _summary(evidence: Evidence) -> Iterator[str]:
     yield f"- It narrows: {_names(evidence, 'rough')}."
     yield f"- It cannot tell: {_names(evidence, 'unknown')}."
     yield f"- {_verdict(evidence)}"
+
+
+def _deviations(_: Evidence) -> Iterator[str]:
+    yield "## Deviations from print"
+    yield ""
+    yield "Every published optimum on the default model, fitted or held out: print → simulated."
+    yield ""
+    yield deviations()
 
 
 def _names(evidence: Evidence, trust: str) -> str:

@@ -55,7 +55,7 @@ class ReferenceView(View):
     )
     fitness: Finite = Field(
         description="By the job's measure, in double precision [1]; null if it fails.",
-        examples=[20.93],
+        examples=[20.72],
     )
 
     @classmethod

@@ -7,7 +7,6 @@ from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
 from gaitswarm.optimization import OptimizationResult, optimize
-from gaitswarm.robustness_index import RobustnessView, robustness
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
@@ -19,6 +18,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     RobustPreferencesView,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
+from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
 from gaitswarm.services.optimizer.analysis.targets import TargetsView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
@@ -58,7 +58,7 @@ from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Status
 from gaitswarm.sim.robot import RobotFiles, RobotVariant
 from gaitswarm.sim.scenario import PRESETS, SCENARIOS, Scenario
 from gaitswarm.sim.variables import Variable
-from gaitswarm.simulation import ScenarioResult, SimulationResult, simulate
+from gaitswarm.simulation import ScenarioResult, SimulationResult, robustness, simulate
 from gaitswarm.specs import SpecOptions, job_spec
 from gaitswarm.surface import SurfaceView
 from gaitswarm.tables import EvaluationTable, Table

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, GaitswarmError, InvalidRequest
+from gaitswarm.services.optimizer.errors import GaitswarmError, InvalidRequest
 from gaitswarm.services.optimizer.masking import masked_url
-from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -55,14 +52,3 @@ def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest
     first, *others = field_errors(found)
     more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
     return InvalidRequest(first.message + more, field=first.field)
-
-
-@contextmanager
-def simulation_errors(field: str) -> Iterator[None]:
-    """Convert errors of the simulator to errors of the library."""
-    try:
-        yield
-    except SimulationInputError as error:
-        raise InvalidRequest(str(error), field=field) from error
-    except SimulationError as error:
-        raise EvaluatorUnavailable(str(error)) from error

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from pydantic import Field
 
-from gaitswarm.designs import ScenariosRequest
-from gaitswarm.errors import simulation_errors
 from gaitswarm.robots import check_new, new_folder
+from gaitswarm.services.optimizer.errors import simulation_errors
+from gaitswarm.services.optimizer.jobs.designs import ScenariosRequest
 from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.firmware.folder import (

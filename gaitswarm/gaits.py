@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 from pydantic import Field
 
-from gaitswarm.errors import simulation_errors
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
 from gaitswarm.sim.gait.gaits import GAITS, find_gait, leg_gaits, suits, supporting

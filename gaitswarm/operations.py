@@ -8,7 +8,6 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gaitswarm.designs import SimulationRequest, resolved
 from gaitswarm.firmware import (
     FirmwareRequest,
     FirmwareView,
@@ -36,7 +35,6 @@ from gaitswarm.recordings import (
 from gaitswarm.replay import ReplayRequest, run_replay
 from gaitswarm.robots import RobotCheckView, RobotDraftRequest, RobotDraftView, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
-from gaitswarm.robustness_index import RobustnessRequest, RobustnessView, run_robustness
 from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView, convergence
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView, encoded_particles
 from gaitswarm.services.optimizer.analysis.distribution import distribution as spread
@@ -45,15 +43,18 @@ from gaitswarm.services.optimizer.analysis.reference import (
     ReferenceView,
     with_reference,
 )
+from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
 from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.firmware.folder import parsed_table_bits
 from gaitswarm.sim.robot import RobotFiles
-from gaitswarm.simulation import SimulationView, run_simulation
+from gaitswarm.sim.scenario import find_scenario
+from gaitswarm.simulation import SimulationView, run_robustness, run_simulation
 from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.views.catalogue import (
     CaseView,
@@ -278,7 +279,7 @@ class ServedJobs(DatabaseJobs):
             with spaces to a multiple of 4), then frame after frame of float32 numbers in the order
             of the header's channels; all little-endian.
         """
-        seconds = design.simulated_seconds([resolved(design.scenario)])
+        seconds = design.simulated_seconds([find_scenario(design.scenario)])
         self._context.limits.check(seconds, logged=True, field="scenario")
         return run_replay(design)
 
@@ -395,7 +396,7 @@ class ServedJobs(DatabaseJobs):
         the whole cycles that both share. The log itself is not stored. Bodies may be larger than
         elsewhere (GAITSWARM_API_MAX_LOG_BYTES).
         """
-        seconds = request.simulated_seconds([resolved(request.scenario)])
+        seconds = request.simulated_seconds([find_scenario(request.scenario)])
         self._context.limits.check(seconds, logged=True, field="scenario")
         store = partial(self._service.store.add_recording, actor=self._context.actor)
         return read_measured_walk(request, store)

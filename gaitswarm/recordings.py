@@ -8,9 +8,8 @@ from datetime import datetime
 
 from pydantic import Field
 
-from gaitswarm.designs import DesignRequest, resolved
-from gaitswarm.errors import simulation_errors
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
+from gaitswarm.services.optimizer.jobs.designs import DesignRequest
 from gaitswarm.services.optimizer.jobs.listing import RecordingEntry
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
@@ -23,7 +22,7 @@ from gaitswarm.sim.measurement.measured_log import (
     synchronise,
 )
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.scenario import Scenario, ScenarioChoice
+from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.sim.validation import Verdict, compare_synchronised
 
 
@@ -135,7 +134,7 @@ def read_measured_walk(
     store: returns the recording's id.
     """
     request.check_design()
-    scenario, design = resolved(request.scenario), request.numbers
+    scenario, design = find_scenario(request.scenario), request.numbers
     robot = load_robot(request.robot)
     with simulation_errors("scenario"):
         walk = MeasuredWalk.of(robot, scenario, request.controller, design)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.designs import WorldRequest, resolved
 from gaitswarm.meshes import urdf_digest
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.designs import WorldRequest
 from gaitswarm.services.optimizer.views import StatusName, View, finite, framed
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
@@ -20,7 +20,7 @@ from gaitswarm.sim.replay import CONTROL_RATE, Replay
 from gaitswarm.sim.replay import replay as replayed
 from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.shapes import VisibleLink
-from gaitswarm.sim.scenario import Scenario, ScenarioChoice
+from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.simulation import QUANTITIES
 
 VERSION: Final = 1
@@ -133,7 +133,7 @@ class ReplayHeaderView(View):
 
 def run_replay(request: ReplayRequest) -> bytes:
     """Simulate the design and encode its replay."""
-    scenario = resolved(request.scenario)
+    scenario = find_scenario(request.scenario)
     request.check_design()
     request.check_reach(scenario, field="scenario")
     robot = load_robot(request.robot)

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.errors import simulation_errors
 from gaitswarm.meshes import copy_meshes, found_mesh, mesh_places
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
 from gaitswarm.sim.controllers.joint_pd import LARGEST_GAIN

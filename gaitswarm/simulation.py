@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, TypeAlias
+from typing import Annotated, Any, Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, WithJsonSchema
 
-from gaitswarm.designs import SimulationRequest
-from gaitswarm.errors import simulation_errors
 from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
+from gaitswarm.services.optimizer.analysis.robustness import (
+    RobustnessRequest,
+    RobustnessView,
+    robustness_view,
+)
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
+from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
-from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View, finite
-from gaitswarm.sim.case import Case, MeasuredWalk
+from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait.stability import Stability, static_stability
@@ -28,16 +34,17 @@ from gaitswarm.sim.outcome import MEASUREMENT_NAMES, N_OBJECTIVES, OBJECTIVE_NAM
 from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.variables import Variable
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput, checked
 from gaitswarm.tables import Table
-
-if TYPE_CHECKING:
-    pass
 
 Floats = NDArray[np.float64]
 
 ALL_SCENARIOS: Final = tuple(scenario.name for scenario in SCENARIOS)
 """The six scenarios of table 4.2."""
+
+Progress = Callable[[int, int], None]
+"""Called with the number of simulations done and their total."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -463,15 +470,23 @@ def evaluated(
     precision: Precision,
     *,
     cpus: int | None = None,
-    on_task: OnTask | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Outcome, ...]:
     """Evaluate designs in threads of this process."""
     from gaitswarm.services.runtime import open_evaluator
 
+    done, planned = 0, len(designs) * len(cases)
+
+    def report(task: TaskReport) -> None:
+        nonlocal done
+        done += task.walks if task.error is None else 0
+        if progress is not None:
+            progress(done, planned)
+
     provenance = provenance_of(*robots, precision=precision)
-    asked = EvaluationRequest("", tuple(cases), designs, provenance, on_task=on_task)
+    request = EvaluationRequest("", tuple(cases), designs, provenance, on_task=report)
     with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
-        return evaluator.evaluate(asked, lambda: False)
+        return evaluator.evaluate(request, lambda: False)
 
 
 def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floats]:
@@ -505,3 +520,119 @@ def _by_variable(designs: DesignInput) -> dict[str, ArrayLike]:
         if design.keys() != designs[0].keys():
             raise KeyError("designs differ in their variables")
     return {name: [design[name] for design in designs] for name in (designs[0] if designs else ())}
+
+
+def robustness(
+    design: Mapping[str, float | str],
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
+    controller: ControllerName = "fuzzy-pi",
+    robot: RobotInput = DEFAULT_ROBOT,
+    precision: Precision = "double",
+    variables: Sequence[str | Variable] | None = None,
+    samples: int = 256,
+    radius: float = 0.02,
+    seed: int = 1,
+    cpus: int | None = None,
+    progress: Progress | None = None,
+) -> RobustnessView:
+    """Estimate how robust a design is against small changes of its variables (thesis 4.4.3).
+
+    The index is the Frobenius norm of the Jacobian of the objectives' logarithms, f1 to f5 of table
+    4.1, by the variables as shares of their bounds: the smaller, the more robust. It comes from a
+    linear regression over designs that are drawn around the given one, as objectives are not
+    smooth.
+
+    Args:
+        design: Value of each of the controller's variables, and of any gait variable, in the
+            variables' units.
+        scenarios: One scenario or several: names or numbers of presets, or `Scenario`.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        precision: Of the physics' numbers.
+        variables: Variables to vary, normalised by their bounds: names, or `Variable` with
+            bounds of your own; default all of the controller's.
+        samples: Designs to sample around the given one.
+        radius: Largest distance from it, as a share of each variable's bounds.
+        seed: Of the sample.
+        cpus: Threads; default all processors.
+        progress: Called with the number of simulations done and their total.
+
+    Returns:
+        The index with its interval, by scenario, objective and variable.
+
+    Raises:
+        InvalidRequest: An argument is invalid; names it.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    arguments = {
+        "design": design,
+        "scenarios": scenarios,
+        "controller": controller,
+        "robot": robot,
+        "precision": precision,
+        "variables": variables,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+    }
+    request = checked(RobustnessRequest, arguments)
+    with simulation_errors("design"):
+        return run_robustness(request, cpus=cpus, progress=progress)
+
+
+def run_robustness(
+    request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
+) -> RobustnessView:
+    """Simulate a design and a sample around it, and estimate its robustness."""
+    request.check_walks()
+    sample = request.sample()
+    cases = [
+        Walk(request.robot, request.controller, scenario, sample.names, request.precision)
+        for scenario in request.resolved_scenarios()
+    ]
+    robots = [request.robot]
+    outcomes = evaluated(
+        cases, sample.designs, robots, request.precision, cpus=cpus, progress=progress
+    )
+    return robustness_view(request, sample, outcomes)
+
+
+def sampled_indices(
+    spec: JobSpec,
+    request: PreferencesRequest,
+    designs: list[dict[str, float | str]],
+    *,
+    progress: Progress | None = None,
+    check: Callable[[float], None] = lambda _seconds: None,
+) -> list[IndexView | None]:
+    """Simulate samples around designs of a job and estimate the robustness index of each.
+
+    `check` is called with the simulated time of all of them [s].
+    """
+    if spec.case is not None:
+        raise InvalidRequest(
+            f"the job's designs were evaluated by {spec.case.name}, and samples would use"
+            " gaitswarm's simulator; give 0",
+            field="samples",
+        )
+    document = {
+        "robot": spec.robot,
+        "controller": spec.controller,
+        "scenarios": spec.resolved_scenarios(),
+        "variables": spec.design_space().variables,
+        **request.model_dump(include={"samples", "radius", "seed", "precision"}),
+    }
+    requests = [checked(RobustnessRequest, {**document, "design": design}) for design in designs]
+    seconds = sum(one.simulated_seconds(one.resolved_scenarios()) for one in requests)
+    check(seconds * (1 + request.samples))
+    indices = []
+    for number, one in enumerate(requests):
+
+        def overall(done: int, planned: int, before: int = number) -> None:
+            if progress is not None:
+                progress(before * planned + done, len(requests) * planned)
+
+        with simulation_errors("job_id"):
+            indices.append(run_robustness(one, progress=overall).index)
+    return indices

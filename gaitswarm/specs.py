@@ -11,9 +11,9 @@ from typing import Any, Final, TypeAlias, TypedDict, TypeVar, Unpack, cast, over
 
 from pydantic import BaseModel, ValidationError
 
-from gaitswarm.errors import invalid_request, simulation_errors
+from gaitswarm.errors import invalid_request
 from gaitswarm.robots import read_text, robot_defaults
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from gaitswarm.designs import PUBLISHED_DESIGN
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.designs import PUBLISHED_DESIGN
 from gaitswarm.services.optimizer.views import Request, View
 from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName

@@ -115,7 +115,7 @@ class TargetWalk(BaseModel):
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:
         """The scenarios in full, presets looked up."""
-        return tuple(find_scenario(s) if isinstance(s, str) else s for s in self.scenarios)
+        return tuple(map(find_scenario, self.scenarios))
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:

@@ -368,7 +368,10 @@ PRESETS: Final[tuple[Scenario, ...]] = (
 """
 
 
-def find_scenario(name: str) -> Scenario:
+def find_scenario(name: str | Scenario) -> Scenario:
+    """Return a preset by name or number; a scenario in full as it is."""
+    if isinstance(name, Scenario):
+        return name
     for number, scenario in enumerate(PRESETS, start=1):
         if name in (scenario.name, str(number)):
             return scenario

@@ -282,12 +282,12 @@ def preferences(
     Ranks stored designs under many preferences, and estimates the robustness index of the winners
     by simulation. With --for, finds the preference that makes a design the best.
     """
-    from gaitswarm.robustness_index import sampled_indices
     from gaitswarm.services.optimizer.analysis.preferences import (
         PreferencesRequest,
         robust_preferences,
     )
     from gaitswarm.settings import read_place
+    from gaitswarm.simulation import sampled_indices
     from gaitswarm.specs import checked
 
     if for_design is not None:

@@ -358,7 +358,7 @@ def _engine_table(name: str, engine: ComparedEngineView) -> Table:
 
 def _replayed(spec: CertificateSpec, world: int, log: Path | None) -> tuple[dict[str, Any], Parts]:
     """Simulate a certificate's design in one world."""
-    from gaitswarm.designs import SimulationRequest
+    from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
 
     request = SimulationRequest(

@@ -35,8 +35,8 @@ from gaitswarm.cli.tables import (
 if TYPE_CHECKING:
     from gaitswarm.cli.inputs import GivenDesign
     from gaitswarm.firmware import FirmwareView
-    from gaitswarm.robustness_index import Progress, RobustnessRequest, RobustnessView
-    from gaitswarm.simulation import SimulationView
+    from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
+    from gaitswarm.simulation import Progress, SimulationView
 
 
 def simulate(
@@ -81,8 +81,8 @@ def simulate(
     from pydantic import ValidationError
 
     from gaitswarm.cli.inputs import given_design, json_object, robot_defaults, scenario_data
-    from gaitswarm.designs import SimulationRequest
     from gaitswarm.errors import invalid_request
+    from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
 
     given = given_design(design, controller, trajectory, robot=robot, place=place)
@@ -184,7 +184,7 @@ class SampleOptions:
 
         from gaitswarm.cli.inputs import robot_defaults, scenario_data
         from gaitswarm.errors import invalid_request
-        from gaitswarm.robustness_index import RobustnessRequest
+        from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest
 
         scenarios: Any = scenario_data(self.scenarios or "all", self.robot)
         if given.spec is None:
@@ -268,7 +268,7 @@ def _robustness(view: RobustnessView) -> Parts:
 
 def estimate(request: RobustnessRequest) -> RobustnessView:
     """Estimate the index, with progress on stderr."""
-    from gaitswarm.robustness_index import run_robustness
+    from gaitswarm.simulation import run_robustness
 
     with shown_progress() as progress:
         return run_robustness(request, progress=progress)
@@ -341,7 +341,7 @@ def firmware(
 
 
 def _bits(text: str) -> tuple[int, int]:
-    from gaitswarm.errors import simulation_errors
+    from gaitswarm.services.optimizer.errors import simulation_errors
     from gaitswarm.sim.firmware.folder import parsed_table_bits
 
     with simulation_errors("table_bits"):

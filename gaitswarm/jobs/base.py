@@ -41,9 +41,6 @@ from gaitswarm.jobs.operation import (
     robots,
 )
 from gaitswarm.recordings import RecordingEntryView, RecordingView
-from gaitswarm.robustness_index import (
-    sampled_indices,
-)
 from gaitswarm.services.optimizer.analysis.certificate import (
     MOST_WORST,
     CertificateView,
@@ -105,6 +102,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.simulation import sampled_indices
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,

@@ -10,12 +10,17 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from gaitswarm.errors import Interrupted, simulation_errors
+from gaitswarm.errors import Interrupted
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
 from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.analysis.reference import note_reference
-from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
+from gaitswarm.services.optimizer.errors import (
+    Conflict,
+    InvalidRequest,
+    ProvenanceChanged,
+    simulation_errors,
+)
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState

@@ -22,7 +22,11 @@ GaitswarmError
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import ClassVar
+
+from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
 
 class GaitswarmError(Exception):
@@ -132,3 +136,14 @@ class StoreReplaced(StoreUnavailable):
     for_clients: ClassVar[str] = (
         "the database file was removed or replaced while it was open; restart the server"
     )
+
+
+@contextmanager
+def simulation_errors(field: str) -> Iterator[None]:
+    """Convert errors of the simulator; `field` is that of the request which an input comes from."""
+    try:
+        yield
+    except SimulationInputError as error:
+        raise InvalidRequest(str(error), field=field) from error
+    except SimulationError as error:
+        raise EvaluatorUnavailable(str(error)) from error

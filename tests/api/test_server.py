@@ -133,7 +133,7 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
 @pytest.mark.slow
 def test_views_need_no_web_framework_and_the_api_neither_ray_nor_a_database_nor_scipy() -> None:
     statements = (
-        "import gaitswarm.views.job, gaitswarm.designs, sys\n"
+        "import gaitswarm.views.job, gaitswarm.services.optimizer.jobs.designs, sys\n"
         "assert not {'fastapi', 'starlette', 'uvicorn'} & set(sys.modules)\n"
         "import gaitswarm.api.app, gaitswarm.api.server"
     )

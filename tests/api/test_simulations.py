@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.api.dependencies import ComputingCapacity
-from gaitswarm.designs import SimulationRequest
+from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.simulation import SimulationView, run_simulation

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from gaitswarm.designs import SimulationRequest
+from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from gaitswarm.simulation import run_simulation
 from tests.examples.paths import QUADRUPED

@@ -8,7 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from gaitswarm.robustness_index import LocalSample, Sensitivities, local_sample, sensitivities
+from gaitswarm.services.optimizer.analysis.robustness import (
+    LocalSample,
+    Sensitivities,
+    local_sample,
+    sensitivities,
+)
 from gaitswarm.sim.variables import Variable
 
 X = Variable(name="x", low=0.0, high=10.0)

@@ -11,8 +11,7 @@ Spec
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
@@ -389,12 +388,3 @@ class Spec(BaseModel):
 
 def judge_outcomes(spec: Spec, outcomes: tuple[Outcome, ...]) -> Judgement:
     return spec.judge(*by_design(outcomes))
-
-
-@contextmanager
-def requested(field: str) -> Iterator[None]:
-    """Convert a simulator's error to one that names the field of the request."""
-    try:
-        yield
-    except SimulationInputError as error:
-        raise InvalidRequest(str(error), field=field) from error

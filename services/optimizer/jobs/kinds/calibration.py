@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
+from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
@@ -20,7 +21,7 @@ from gaitswarm.services.optimizer.jobs.preference import (
     figure_of_merit,
     judge,
 )
-from gaitswarm.services.optimizer.jobs.spec import Spec, requested
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.calibration import (
     QUANTITIES,
     CalibrationWalk,
@@ -274,7 +275,7 @@ class CalibrationSpec(Spec):
                 )
             for index, case in self._walks(cases):
                 drive = case.drive(values)
-                with requested(f"walks.{index}.design"):
+                with simulation_errors(f"walks.{index}.design"):
                     law = CONTROLLERS[case.controller].compile(drive)
                     for robot in self.robot_sources:
                         check_drives(law, robot)
@@ -290,7 +291,7 @@ class CalibrationSpec(Spec):
                 continue
             gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
             for robot in self.robot_sources:
-                with requested(f"walks.{index}"):
+                with simulation_errors(f"walks.{index}"):
                     check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)
 
     @property

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
+from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
-from gaitswarm.services.optimizer.jobs.spec import requested
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
 from gaitswarm.services.optimizer.search.stateful import CountedState, Stateful
@@ -413,14 +413,14 @@ class CertificateSpec(WalksSpec):
         """Check the design, the scenarios, and the worlds at both ends of all ranges."""
         super().check_can_be_simulated()
         if self.engines:
-            with requested("engines"):
+            with simulation_errors("engines"):
                 check_installed()
-        with requested("design"):
+        with simulation_errors("design"):
             law = CONTROLLERS[self.controller].compile(self.numbers)
         self.check_drives(law)
         names, values = tuple(self.numbers), tuple(self.numbers.values())
         for index, scenario in enumerate(self.resolved_scenarios()):
-            with requested(f"scenarios.{index}"):
+            with simulation_errors(f"scenarios.{index}"):
                 check_reach(scenario, names, values, robot=self.robot)
         space = self.world_space()
         corners = np.stack([space.low, space.high])

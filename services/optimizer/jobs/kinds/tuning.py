@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler, m
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import (
@@ -25,7 +25,7 @@ from gaitswarm.services.optimizer.jobs.preference import (
     judge,
     objective_vectors,
 )
-from gaitswarm.services.optimizer.jobs.spec import Spec, requested
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.case import Case, Walk
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
@@ -59,9 +59,7 @@ class WalksSpec(Spec):
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:
         """Return the scenarios with presets resolved."""
-        return tuple(
-            find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
-        )
+        return tuple(map(find_scenario, self.scenarios))
 
     def resolved_preference(self) -> Preference:
         """Return the preference with a preset resolved."""
@@ -76,7 +74,7 @@ class WalksSpec(Spec):
         Raises:
             InvalidRequest: It cannot; the field is `controller`.
         """
-        with requested("controller"):
+        with simulation_errors("controller"):
             check_drives(law, self.robot)
 
     @property
@@ -236,7 +234,7 @@ class JobSpec(WalksSpec):
         if self.worlds is not None:
             variables = self.worlds.variables()
             ends = np.array([[v.low for v in variables], [v.high for v in variables]])
-            with requested("worlds.ranges"):
+            with simulation_errors("worlds.ranges"):
                 check_worlds(tuple(v.name for v in variables), ends)
         searches_posture = any(split_name(v.name)[0] in _POSTURE for v in space.variables)
         gentlest = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
@@ -251,7 +249,7 @@ class JobSpec(WalksSpec):
                 if isinstance(error, UnreachablePose | BeyondJointLimit) and searches_posture:
                     continue
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
-        with requested("case"):
+        with simulation_errors("case"):
             self.cases({})
 
     @property

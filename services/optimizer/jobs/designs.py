@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat, model_validator
 
-from gaitswarm.errors import simulation_errors
-from gaitswarm.robots import DEFAULT_CONTROLLER, DEFAULT_PREFERENCE
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Request
 from gaitswarm.sim.assembly import check_precision
@@ -39,7 +37,7 @@ class DesignRequest(Request):
         " backlash, or the text of the files of your own.",
     )
     controller: ControllerName = Field(
-        default=DEFAULT_CONTROLLER,
+        default="fuzzy-pi",
         description="Motor controller that drives it; see /v1/controllers.",
     )
     design: dict[VariableName, VariableValue] = Field(
@@ -69,10 +67,8 @@ class DesignRequest(Request):
 
     def check_design(self) -> None:
         """Check that the design suits the controller, and the controller the robot."""
-        try:
+        with simulation_errors("design"):
             law = CONTROLLERS[self.controller].compile(self.numbers)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field="design") from error
         with simulation_errors("controller"):
             check_drives(law, self.robot)
 
@@ -84,10 +80,8 @@ class DesignRequest(Request):
     def check_reach(self, scenario: Scenario, *, field: str) -> None:
         """Check that the legs reach the gait's trajectory."""
         names, values = tuple(self.design), tuple(self.numbers.values())
-        try:
+        with simulation_errors(field):
             check_reach(scenario, names, values, robot=self.robot)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field=field) from error
 
 
 class ScenariosRequest(DesignRequest):
@@ -108,17 +102,12 @@ class ScenariosRequest(DesignRequest):
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:
         """The scenarios in full, presets looked up."""
-        return tuple(map(resolved, self.scenarios))
+        return tuple(map(find_scenario, self.scenarios))
 
     def check_gaits(self) -> None:
         """Check every scenario's gait."""
         for index, scenario in enumerate(self.resolved_scenarios()):
             self.check_reach(scenario, field=f"scenarios.{index}")
-
-
-def resolved(entry: str | Scenario) -> Scenario:
-    """A scenario in full."""
-    return find_scenario(entry) if isinstance(entry, str) else entry
 
 
 class WorldRequest(DesignRequest):
@@ -201,7 +190,7 @@ class SimulationRequest(WalksRequest, WorldRequest):
     """A design, its scenarios, and how to judge it."""
 
     preference: PreferenceChoice = Field(
-        default=DEFAULT_PREFERENCE,
+        default="A",
         description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
         " your own.",
     )

@@ -8,44 +8,35 @@ Jacobian is that of a linear regression over a sample of designs around the give
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from gaitswarm.designs import WalksRequest
-from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
-from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
+from gaitswarm.services.optimizer.analysis.preferences import IndexView
 from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.run.evaluator import TaskReport
+from gaitswarm.services.optimizer.jobs.designs import WalksRequest
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View
-from gaitswarm.sim.case import Walk
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
-from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
-from gaitswarm.simulation import ALL_SCENARIOS, evaluated
-from gaitswarm.specs import RobotInput, ScenarioInput, checked
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _RESAMPLES: Final = 400
 _SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
-
-Progress = Callable[[int, int], None]
-"""Called with the number of simulations done and their total."""
 
 
 class RobustnessRequest(WalksRequest):
@@ -175,95 +166,18 @@ class RobustnessView(Sensitivities):
     objectives: list[ObjectiveView] = Field(description="Normalised objectives, f1 to f5.")
 
 
-def robustness(
-    design: Mapping[str, float | str],
-    *,
-    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
-    controller: ControllerName = "fuzzy-pi",
-    robot: RobotInput = DEFAULT_ROBOT,
-    precision: Precision = "double",
-    variables: Sequence[str | Variable] | None = None,
-    samples: int = 256,
-    radius: float = 0.02,
-    seed: int = 1,
-    cpus: int | None = None,
-    progress: Progress | None = None,
+def robustness_view(
+    request: RobustnessRequest, sample: LocalSample, outcomes: Sequence[Outcome]
 ) -> RobustnessView:
-    """Estimate how robust a design is against small changes of its variables (thesis 4.4.3).
-
-    The index is the Frobenius norm of the Jacobian of the objectives' logarithms, f1 to f5 of table
-    4.1, by the variables as shares of their bounds: the smaller, the more robust. It comes from a
-    linear regression over designs that are drawn around the given one, as objectives are not
-    smooth.
-
-    Args:
-        design: Value of each of the controller's variables, and of any gait variable, in the
-            variables' units.
-        scenarios: One scenario or several: names or numbers of presets, or `Scenario`.
-        controller: Motor controller that drives the robot.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        precision: Of the physics' numbers.
-        variables: Variables to vary, normalised by their bounds: names, or `Variable` with
-            bounds of your own; default all of the controller's.
-        samples: Designs to sample around the given one.
-        radius: Largest distance from it, as a share of each variable's bounds.
-        seed: Of the sample.
-        cpus: Threads; default all processors.
-        progress: Called with the number of simulations done and their total.
-
-    Returns:
-        The index with its interval, by scenario, objective and variable.
-
-    Raises:
-        InvalidRequest: An argument is invalid; names it.
-        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
-    """
-    arguments = {
-        "design": design,
-        "scenarios": scenarios,
-        "controller": controller,
-        "robot": robot,
-        "precision": precision,
-        "variables": variables,
-        "samples": samples,
-        "radius": radius,
-        "seed": seed,
-    }
-    request = checked(RobustnessRequest, arguments)
-    with simulation_errors("design"):
-        return run_robustness(request, cpus=cpus, progress=progress)
-
-
-def run_robustness(
-    request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
-) -> RobustnessView:
-    """Simulate a design and a sample around it, and estimate its robustness."""
-    request.check_walks()
-    sample, scenarios = request.sample(), request.resolved_scenarios()
-    cases = [
-        Walk(request.robot, request.controller, scenario, sample.names, request.precision)
-        for scenario in scenarios
-    ]
-    done, planned = 0, len(sample.designs) * len(cases)
-
-    def report(task: TaskReport) -> None:
-        nonlocal done
-        done += task.walks if task.error is None else 0
-        if progress is not None:
-            progress(done, planned)
-
-    outcomes = evaluated(
-        cases, sample.designs, [request.robot], request.precision, cpus=cpus, on_task=report
-    )
+    """Estimate the robustness of a design from the outcomes of a sample in its scenarios."""
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
-    names = [scenario.name for scenario in scenarios]
-    center = dict(zip(sample.names, sample.designs[0].tolist(), strict=True))
+    names = [scenario.name for scenario in request.resolved_scenarios()]
     return RobustnessView(
         **dict(sensitivities(sample, objectives, failed, names)),
         **request.model_dump(include={"controller", "precision", "samples", "radius", "seed"}),
         robot=request.robot,
-        design=design_shown(request.controller, center),
+        design=design_shown(request.controller, request.numbers),
         variables=[
             SampledVariableView(name=variable.name, least=values.min(), most=values.max())
             for variable in sample.varied
@@ -272,51 +186,6 @@ def run_robustness(
         held=list(sample.held),
         objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
     )
-
-
-def sampled_indices(
-    spec: JobSpec,
-    request: PreferencesRequest,
-    designs: list[dict[str, float | str]],
-    *,
-    progress: Progress | None = None,
-    check: Callable[[float], None] = lambda _seconds: None,
-) -> list[IndexView | None]:
-    """Simulate samples around designs of a job and estimate the robustness index of each.
-
-    `check` is called with the simulated time of all of them [s].
-    """
-    if spec.case is not None:
-        raise InvalidRequest(
-            f"the job's designs were evaluated by {spec.case.name}, and samples would use"
-            " gaitswarm's simulator; give 0",
-            field="samples",
-        )
-    document = {
-        "robot": spec.robot,
-        "controller": spec.controller,
-        "scenarios": spec.resolved_scenarios(),
-        "variables": spec.design_space().variables,
-        **request.model_dump(include={"samples", "radius", "seed", "precision"}),
-    }
-    try:
-        requests = [
-            RobustnessRequest.model_validate({**document, "design": design}) for design in designs
-        ]
-    except ValidationError as error:
-        raise invalid_request(error) from error
-    seconds = sum(one.simulated_seconds(one.resolved_scenarios()) for one in requests)
-    check(seconds * (1 + request.samples))
-    indices = []
-    for number, one in enumerate(requests):
-
-        def overall(done: int, planned: int, before: int = number) -> None:
-            if progress is not None:
-                progress(before * planned + done, len(requests) * planned)
-
-        with simulation_errors("job_id"):
-            indices.append(run_robustness(one, progress=overall).index)
-    return indices
 
 
 def least_samples(varied: int) -> int:

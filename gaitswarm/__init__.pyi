@@ -19,6 +19,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
+from gaitswarm.services.optimizer.analysis.surface import SurfaceView
 from gaitswarm.services.optimizer.analysis.targets import TargetsView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
@@ -60,7 +61,6 @@ from gaitswarm.sim.scenario import PRESETS, SCENARIOS, Scenario
 from gaitswarm.sim.variables import Variable
 from gaitswarm.simulation import ScenarioResult, SimulationResult, robustness, simulate
 from gaitswarm.specs import SpecOptions, job_spec
-from gaitswarm.surface import SurfaceView
 from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views.catalogue import optimizers
 from gaitswarm.views.job import (

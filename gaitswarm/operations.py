@@ -44,6 +44,7 @@ from gaitswarm.services.optimizer.analysis.reference import (
     with_reference,
 )
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
+from gaitswarm.services.optimizer.analysis.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
@@ -55,7 +56,6 @@ from gaitswarm.sim.firmware.folder import parsed_table_bits
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.simulation import SimulationView, run_robustness, run_simulation
-from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,

@@ -14,7 +14,7 @@ from gaitswarm.cli.tables import gait_in_words
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.gaits import GaitsView, GaitView
+    from gaitswarm.cli.gaits import GaitsView, GaitView
     from gaitswarm.robots import MadeRobot, RobotCheckView
     from gaitswarm.sim.robot import RobotFiles
 
@@ -207,8 +207,8 @@ def gaits(
     ] = None,
 ) -> Printed:
     """List gaits: order of footfalls, supporting feet, static stability."""
+    from gaitswarm.cli.gaits import planned_gaits
     from gaitswarm.cli.inputs import chosen_robot, one_scenario
-    from gaitswarm.gaits import planned_gaits
 
     view = planned_gaits(
         chosen_robot(robot),

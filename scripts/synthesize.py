@@ -2,8 +2,8 @@
 
     python -m scripts.synthesize --design published:A --scenario 1 --seed 1 --output walk.csv
 
-No log of a real robot is public. Synthetic ones serve to test the toolkit and the identification of
-parameters, whose true values are known here; they say nothing about the accuracy of the model.
+No log of Szabad(ka)-II is public. Synthetic ones serve to test the toolkit and the identification
+of parameters, whose true values are known here; they say nothing about the model's accuracy.
 """
 
 from __future__ import annotations
@@ -104,6 +104,7 @@ class Instruments(BaseModel):
     acceleration_noise: float = Field(default=0.005, ge=0.0, description="[g]")
     rate_noise: float = Field(default=0.01, ge=0.0, description="gyroscope [rad/s]")
     battery_noise: float = Field(default=0.05, ge=0.0, description="current of the battery [A]")
+    torque_noise: float = Field(default=0.05, ge=0.0, description="[N m]")
     lead: float = Field(
         default=0.124, ge=0.0, le=10.0, description="standing logged before the walk begins [s]"
     )
@@ -255,6 +256,7 @@ def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) ->
         body_acceleration=noisy(Quantity.BODY_ACCELERATION, errors.acceleration_noise),
         body_rate=noisy(Quantity.BODY_RATE, errors.rate_noise),
         battery_current=noisy(Quantity.BATTERY_CURRENT, errors.battery_noise),
+        torque=log.torque if log.torque is None else noisy(Quantity.TORQUE, errors.torque_noise),
     )
 
 

@@ -19,7 +19,7 @@ from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.kernel.dynamics.electrical import supply_voltage
-from gaitswarm.sim.kernel.observation import sensed_currents, split_states
+from gaitswarm.sim.kernel.observation import sensed_currents, split_states, walk_log
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Objective, Outcome, Status
 from gaitswarm.sim.robot import Robot, RobotSource, load_robot
@@ -110,20 +110,14 @@ class RecordedWalk(BaseModel):
         return {name: v for name, v in self.design.items() if name not in GAIT_CATALOGUE}
 
     def check_reach(self, robot: RobotSource) -> None:
-        """Check that a robot's legs reach all of the walk, and that it can be fitted to currents.
+        """Check that a robot's legs reach all of the walk.
 
         Args:
             robot: The robot.
 
         Raises:
             UnreachablePose: A foot's target lies outside its leg's reach.
-            SimulationInputError: The robot's actuators are torque-controlled.
         """
-        if load_robot(robot).is_torque_controlled:
-            raise SimulationInputError(
-                "identification fits the currents of DC motors; those of torque-controlled"
-                " actuators follow from the command"
-            )
         check_reach(self.scenario, tuple(self.design), tuple(self.design.values()), robot=robot)
 
     @cached_property
@@ -222,10 +216,17 @@ class CurrentFit:
         results = kernel.walk(setups, coding, log=True)
         errors = np.full((len(designs), JOINTS_PER_LEG), np.nan)
         statuses = np.full(len(designs), Status.OK, dtype=np.uint8)
-        for index, (robot, result) in enumerate(zip(robots, results, strict=True)):
+        for index, (robot, setup, result) in enumerate(zip(robots, setups, results, strict=True)):
             statuses[index] = result.status
-            if result.status is Status.OK and result.states is not None:
-                errors[index] = self._errors(recorded_currents(robot, result.states))
+            if result.status is not Status.OK or result.states is None:
+                continue
+            if robot.is_torque_controlled:
+                # Their currents follow from the torques that battery and speed allow.
+                log = walk_log(described, setup, result.states)
+                currents = sensed_currents(robot, log.current, log.voltage)
+            else:
+                currents = recorded_currents(robot, result.states)
+            errors[index] = self._errors(currents)
         return Outcome(errors, statuses)
 
     def _errors(self, currents: Floats) -> Floats:
@@ -237,7 +238,7 @@ class CurrentFit:
 
 
 def recorded_currents(robot: Robot, states: Floats) -> Floats:
-    """Logged motor currents of a walk, by the kernel's formula on whole columns.
+    """Logged currents of DC motors in a walk, by the kernel's formula on whole columns.
 
     Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
     """

@@ -7,7 +7,8 @@
 
 Lines before the headings that begin with `#` are comments; `# key: value` is kept as metadata.
 Columns may have any order. q_POT is optional for any joint, a_BODY and w_BODY for all axes
-together, I_B for the battery; all other quantities are required for every joint and leg.
+together, I_B for the battery; all other quantities are required for every joint and leg. Logs of
+torque-controlled robots have no U_P, need no U_S, and may have tau_M in place of I_M.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from __future__ import annotations
 import csv
 import re
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,18 +101,20 @@ def _checked(
     _check_time(time, line_of)
     _check_currents(values, places, line_of)
 
-    columns = {
+    columns: dict[str, Any] = {
         quantity.column: np.ascontiguousarray(values[:, list(of_channels.values())])
         for quantity, of_channels in places.items()
         if of_channels
     }
+    if "current" not in columns:
+        columns["current"] = np.abs(columns["torque"]) / robot.actuators().torque
     return MeasuredLog(
         joints=robot.joint_names,
         legs=tuple(leg.name for leg in robot.legs),
         time=time.copy(),
         potentiometer_joints=tuple(places[Quantity.POTENTIOMETER]),
         metadata=metadata,
-        **columns,
+        **{"control_voltage": None, "supply": None, **columns},
     )
 
 
@@ -173,7 +176,8 @@ def _cells(line: str, number: int) -> list[str]:
 def expected_channels(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
     """Possible channels of each quantity."""
     channels = channels_by_kind(robot.joint_names, tuple(leg.name for leg in robot.legs))
-    return {quantity: channels[quantity.per] for quantity in Quantity}
+    other = Quantity.CONTROL_VOLTAGE if robot.is_torque_controlled else Quantity.TORQUE
+    return {quantity: channels[quantity.per] for quantity in Quantity if quantity is not other}
 
 
 def _places(headings: list[str], robot: Robot, line: int | None) -> dict[Quantity, dict[str, int]]:
@@ -207,11 +211,12 @@ def _places(headings: list[str], robot: Robot, line: int | None) -> dict[Quantit
     if "time" not in column_of:
         raise MeasuredLogError("is missing", line=line, column=TIME)
     places = {}
+    required = _required(robot, column_of)
     for quantity, channels in expected.items():
         names = {channel: f"{quantity}.{channel}" for channel in channels}
         present = {c: column_of[name] for c, name in names.items() if name in column_of}
         partly = quantity.per == "axis" and present
-        if partly or not quantity.optional:
+        if partly or quantity in required:
             for channel in channels:
                 if channel not in present:
                     raise MeasuredLogError(
@@ -219,6 +224,16 @@ def _places(headings: list[str], robot: Robot, line: int | None) -> dict[Quantit
                     )
         places[quantity] = present
     return places
+
+
+def _required(robot: Robot, names: Iterable[str]) -> set[Quantity]:
+    """Quantities that a log with columns of these names needs for every joint or leg."""
+    required = {quantity for quantity in Quantity if not quantity.optional}
+    if robot.is_torque_controlled:
+        required -= {Quantity.CONTROL_VOLTAGE, Quantity.SUPPLY}
+        if any(name.startswith(f"{Quantity.TORQUE}.") for name in names):
+            required = (required - {Quantity.CURRENT}) | {Quantity.TORQUE}
+    return required
 
 
 def _values(

@@ -57,6 +57,7 @@ class Quantity(StrEnum):
     )
     BODY_RATE = "w_BODY", "rad/s", "axis", "body_rate", "angular rate of the body by the gyroscope"
     BATTERY_CURRENT = "I_B", "A", "battery", "battery_current", "current of the battery"
+    TORQUE = "tau_M", "N m", "joint", "torque", "torque of the actuator by its current"
 
     def __new__(
         cls,
@@ -85,6 +86,7 @@ class Quantity(StrEnum):
             Quantity.BODY_ACCELERATION,
             Quantity.BODY_RATE,
             Quantity.BATTERY_CURRENT,
+            Quantity.TORQUE,
         )
 
 
@@ -105,15 +107,17 @@ class MeasuredLog:
         legs: L names in the robot's order.
         time: from any start, one row per 2 ms, (T,) [s].
         desired_angle: (T, J) [rad].
-        control_voltage: (T, J) [V].
+        control_voltage: (T, J) [V]; None of torque-controlled robots.
         joint_angle: (T, J) [rad].
         current: absolute, (T, J) [A].
-        supply: (T, L) [V].
+        supply: (T, L) [V]; None if not measured, of torque-controlled robots.
         potentiometer_joints: names of the K joints with a potentiometer.
         potentiometer: (T, K) [rad]; None if K is 0.
         body_acceleration: in the body's frame, without gravity, (T, 3) [g]; None if not measured.
         body_rate: in the body's frame, (T, 3) [rad/s]; None if not measured.
         battery_current: discharging is positive, (T, 1) [A]; None if not measured.
+        torque: of torque-controlled actuators, at the joint, signed, before friction, (T, J) [N m];
+            None if not measured.
         metadata: of the file, by name.
     """
 
@@ -121,15 +125,16 @@ class MeasuredLog:
     legs: tuple[str, ...]
     time: Floats
     desired_angle: Floats
-    control_voltage: Floats
+    control_voltage: Floats | None
     joint_angle: Floats
     current: Floats
-    supply: Floats
+    supply: Floats | None
     potentiometer_joints: tuple[str, ...] = ()
     potentiometer: Floats | None = None
     body_acceleration: Floats | None = None
     body_rate: Floats | None = None
     battery_current: Floats | None = None
+    torque: Floats | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -197,7 +202,7 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
         legs=legs,
         time=walk.time,
         desired_angle=walk.desired_angle,
-        control_voltage=walk.voltage,
+        control_voltage=None if robot.is_torque_controlled else walk.voltage,
         joint_angle=walk.motor_angle,
         current=sensed_currents(robot, walk.current, walk.voltage),
         supply=np.repeat(walk.supply[:, None], len(legs), axis=1),
@@ -206,6 +211,7 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
         body_acceleration=walk.body_acceleration() / GRAVITY,
         body_rate=walk.base_velocity[:, 3:],
         battery_current=((walk.voltage * walk.current).sum(axis=1) / walk.supply)[:, None],
+        torque=walk.current * robot.actuators().torque if robot.is_torque_controlled else None,
         metadata={ORIGIN: "simulated", "robot": robot.description.name},
     )
 

@@ -48,6 +48,14 @@ _EFFICIENCY: Final = Variable(
     name="efficiency", low=0.25, high=0.98, unit="1", description="Efficiency of the gearhead of"
 )  # fmt: skip
 
+_FRICTION: Final = Variable(
+    name="viscous_friction",
+    low=0.0,
+    high=0.5,
+    unit="N m s/rad",
+    description="Viscous friction of the torque-controlled actuator of",
+)
+
 _CONTACT: Final = {
     "stiffness": Variable(
         name="stiffness",
@@ -122,10 +130,10 @@ CONVENTIONAL_VARIABLES: Final = (
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
     """Return all parameters in the order of table 2.7, with bounds around its values."""
     legs = robot.description.legs
-    geared = () if robot.is_torque_controlled else robot.joint_names
+    losses = _FRICTION if robot.is_torque_controlled else _EFFICIENCY
     return (
         *_WHOLE,
-        *(_named(_EFFICIENCY, joint) for joint in geared),
+        *(_named(losses, joint) for joint in robot.joint_names),
         *(_named(variable, leg.name) for variable in _CONTACT.values() for leg in legs),
     )
 
@@ -218,8 +226,12 @@ def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescrip
     for leg in d.legs:
         names = list(leg.actuators)
         for index, joint in enumerate(leg.joints):
-            variable = f"efficiency_{joint}"
+            variable, friction = f"efficiency_{joint}", f"viscous_friction_{joint}"
             actuator = actuators[names[index]]
+            if friction in values and isinstance(actuator, TorqueActuator):
+                own = f"of {joint}"
+                actuators[own] = _changed(actuator, {"viscous_friction": friction}, values)
+                names[index] = own
             if variable in values and isinstance(actuator, Actuator):
                 own = f"of {joint}"
                 gearheads[own] = _changed(

@@ -23,7 +23,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.distribution import thinned
-from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, average_ranks
+from gaitswarm.services.optimizer.analysis.statistics import (
+    CONFIDENCE,
+    average_ranks,
+    resample_weights,
+)
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, objective_vectors
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
@@ -245,7 +249,8 @@ def first_order_indices(
     rank -= rank.mean()
     if not rank.any():
         return None
-    weights = np.vstack([np.ones(len(rank)), _bootstrap_weights(len(rank))])
+    draws = RandomNumbers(len(rank), _RESAMPLE).uniform(_RESAMPLES, len(rank))
+    weights = resample_weights(draws)
     tail = 0.5 * (1.0 - CONFIDENCE)
     result = []
     for column, variable in enumerate(variables):
@@ -274,13 +279,6 @@ def companions(designs: Floats, variables: Sequence[Variable]) -> list[tuple[str
         other = int(np.nanargmax(np.abs(row)))
         result.append((variables[other].name, float(np.clip(row[other], -1.0, 1.0))))
     return result
-
-
-def _bootstrap_weights(rows: int) -> Floats:
-    """(resamples, rows): multiplicity of each row in each resample."""
-    random = RandomNumbers(rows, _RESAMPLE)
-    drawn = (random.uniform(_RESAMPLES, rows) * rows).astype(np.intp)
-    return np.stack([np.bincount(row, minlength=rows) for row in drawn]).astype(np.float64)
 
 
 def _classes(values: Floats, variable: Variable) -> NDArray[np.intp]:

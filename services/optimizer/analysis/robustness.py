@@ -18,7 +18,7 @@ from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.analysis.preferences import IndexView
-from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
+from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, resample_weights
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.designs import WalksRequest
@@ -260,7 +260,9 @@ def sensitivities(
     """
     values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
     usable = ~failed & (np.isfinite(values) & (values > 0.0)).all(axis=2)
-    weights = _resamples(len(sample.designs))
+    count = len(sample.designs)
+    draws = swarm_uniform(0, _RESAMPLE, iteration=0, particles=_RESAMPLES, count=count)
+    weights = resample_weights(draws)
     variables = [variable.name for variable in sample.varied]
     views: dict[str, ScenarioRobustnessView] = {}
     biased, unbiased, rows, columns = [], [], [], []
@@ -334,10 +336,3 @@ def _regressions(x: Floats, y: Floats, weights: Floats) -> tuple[Floats, Floats]
     residual_variance = np.maximum(squares, 0.0) / freedom[:, None]
     diagonal = np.diagonal(inverse, axis1=1, axis2=2)[:, 1:]
     return coefficients[:, 1:], diagonal[:, :, None] * residual_variance[:, None, :]
-
-
-def _resamples(n: int) -> Floats:
-    """(1 + B, n) multiplicity of each design: first 1, then as drawn by a bootstrap."""
-    drawn = swarm_uniform(0, _RESAMPLE, iteration=0, particles=_RESAMPLES, count=n)
-    picks = (drawn * n).astype(np.intp)
-    return np.vstack([np.ones(n), *(np.bincount(row, minlength=n) for row in picks)])

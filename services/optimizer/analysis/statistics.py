@@ -1,4 +1,4 @@
-"""Ranks and their correlation"""
+"""Ranks, their correlation, and resamples"""
 
 from __future__ import annotations
 
@@ -27,3 +27,10 @@ def average_ranks(values: Floats) -> Floats:
     _, places, sizes = np.unique(values, return_inverse=True, return_counts=True)
     means = np.cumsum(sizes) - 0.5 * (sizes - 1.0)
     return np.asarray(means[places])
+
+
+def resample_weights(draws: Floats) -> Floats:
+    """(1 + B, n) multiplicity of each row: first 1, then in a bootstrap by draws (B, n) < 1."""
+    rows = draws.shape[1]
+    picks = (draws * rows).astype(np.intp)
+    return np.vstack([np.ones(rows), *(np.bincount(row, minlength=rows) for row in picks)])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, model_validator
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
@@ -84,7 +84,23 @@ class DesignRequest(Request):
             check_reach(scenario, names, values, robot=self.robot)
 
 
-class ScenariosRequest(DesignRequest):
+class Scenarios(BaseModel):
+    """Scenarios of a request or of a job; each declares the field with its defaults."""
+
+    if TYPE_CHECKING:
+        scenarios: tuple[ScenarioChoice, ...]
+
+    @model_validator(mode="after")
+    def _scenarios_differ(self) -> Self:
+        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """Return the scenarios with presets resolved."""
+        return tuple(map(find_scenario, self.scenarios))
+
+
+class ScenariosRequest(Scenarios, DesignRequest):
     """A design and its scenarios."""
 
     scenarios: tuple[ScenarioChoice, ...] = Field(
@@ -94,15 +110,6 @@ class ScenariosRequest(DesignRequest):
         description="Scenarios: names or numbers of presets (see /v1/scenarios), or your own.",
         examples=[["normal-fast", "2"]],
     )
-
-    @model_validator(mode="after")
-    def _names_are_unique(self) -> Self:
-        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
-        return self
-
-    def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """The scenarios in full, presets looked up."""
-        return tuple(map(find_scenario, self.scenarios))
 
     def check_gaits(self) -> None:
         """Check every scenario's gait."""

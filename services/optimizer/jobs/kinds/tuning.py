@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import product
 from operator import attrgetter
-from typing import TYPE_CHECKING, Annotated, Final, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from pydantic_core import CoreSchema
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.designs import Scenarios
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
@@ -33,10 +34,9 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.identification import Recordings
-from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import PluginSettings
-from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
 from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_worlds
@@ -45,21 +45,11 @@ from gaitswarm.sim.worlds.walks import PerturbedWalk
 Floats = NDArray[np.float64]
 
 
-class WalksSpec(Spec):
+class WalksSpec(Scenarios, Spec):
     """A job with scenarios and a preference; each kind declares these fields with its defaults."""
 
     if TYPE_CHECKING:
-        scenarios: tuple[ScenarioChoice, ...]
         preference: PreferenceChoice
-
-    @model_validator(mode="after")
-    def _scenarios_differ(self) -> Self:
-        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
-        return self
-
-    def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """Return the scenarios with presets resolved."""
-        return tuple(map(find_scenario, self.scenarios))
 
     def resolved_preference(self) -> Preference:
         """Return the preference with a preset resolved."""

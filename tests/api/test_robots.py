@@ -43,7 +43,6 @@ def test_a_urdf_becomes_a_robot_that_stands_and_can_be_submitted(client: httpx2.
     standing = found["standing"]
     assert standing["normal_forces"] == pytest.approx(standing["weight"], rel=0.02)
     assert standing["weight"] == pytest.approx(9.81 * found["mass"], rel=0.001)
-    assert found["meshes"] == []
 
     job = {"robot": robot, **draft["job"], "iterations": 2}
     assert client.post("/v1/estimates", json=job).status_code == 200

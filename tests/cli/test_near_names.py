@@ -63,7 +63,6 @@ def test_in_a_spec(gaitswarm: Gaitswarm, write_json: WriteJson, spec: Any, said:
             ("simulate", "--design", "published:A", "--world", '{"friction_facto": 1}'),
             "world.friction_facto: unknown perturbation; did you mean 'friction_factor'?",
         ),
-        (("compare", "fuzzy-pi3"), "drive: unknown 'fuzzy-pi3'; did you mean 'fuzzy-pi-3'?"),
         (("gaits", "crwl"), "gait: unknown gait 'crwl'; did you mean 'crawl'?"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -362,7 +362,7 @@ def test_a_start_that_makes_no_sense_is_refused_with_its_place(
     designs = db.with_name("designs.csv")
     designs.write_text("I,FI1R\n0.5,1e9\n", encoding="utf-8")
     for options, message in (
-        (("--start-from", designs), "line 2, column FI1R: 1e+09 is outside the bounds"),
+        (("--start-from", designs), "start.0.FI1R: 1e+09 is outside the bounds"),
         (("--start-from", "nothing"), "start.jobs.0: there is no job 'nothing'"),
         (("--start-count", "3"), "start-count: requires --start-from"),
     ):

@@ -92,13 +92,21 @@ def test_the_longest_lease_is_alive_until_its_end(store: Store, clock: Clock) ->
     assert taken(store).taken_from == "runner-a"
 
 
-@pytest.fixture
-def killed_with_its_clock_ahead(store: Store, clock: Clock) -> Claim:
-    """A claim by a runner whose clock was a day ahead, after which the clock was set right."""
-    clock.advance(DAY)
+@pytest.fixture(params=[DAY, 60.0], ids=["a day", "a minute"])
+def killed_with_its_clock_ahead(
+    store: Store, clock: Clock, request: pytest.FixtureRequest
+) -> Claim:
+    """A claim by a runner whose clock was ahead, after which the clock was set right."""
+    clock.advance(request.param)
     claim = begun(store)
-    clock.advance(-DAY)
+    clock.advance(-request.param)
     return claim
+
+
+def test_a_lease_outlives_a_clock_that_is_set_back_a_little(store: Store, clock: Clock) -> None:
+    begun(store)
+    clock.advance(-4.9)
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
 
 
 def test_a_job_is_claimed_whose_runner_died_with_its_clock_ahead(

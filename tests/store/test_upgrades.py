@@ -135,18 +135,23 @@ def test_a_database_that_an_idle_process_has_open_is_not_upgraded(
     assert upgrade(fresh_url) == NEWEST
 
 
-@pytest.mark.parametrize("year", ["2026", "2126"])
+@pytest.mark.parametrize("year", [2026, 2126])
 def test_a_database_with_a_job_under_way_is_not_upgraded(
-    fresh_url: str, year: str, release_next: Callable[[], None]
+    fresh_url: str, year: int, release_next: Callable[[], None]
 ) -> None:
     job_id = store_job(fresh_url)
-    expires = datetime.now(UTC) + timedelta(seconds=LONGEST_LEASE_SECONDS / 2)
-    lease = "UPDATE jobs SET state = 'running', lease_owner = 'elsewhere:7', lease_expires_at = "
-    edit(fresh_url, f"{lease}'{expires:%Y-%m-%d %H:%M:%S}'")
+    now = datetime.now(UTC)
+    expires = now + timedelta(seconds=LONGEST_LEASE_SECONDS / 2)
+    lease = (
+        "UPDATE jobs SET state = 'running', lease_owner = 'elsewhere:7',"
+        " lease_renewed_at = '{:%Y-%m-%d %H:%M:%S}', lease_expires_at = '{:%Y-%m-%d %H:%M:%S}'"
+    )
+    edit(fresh_url, lease.format(now, expires))
     release_next()
     with pytest.raises(Conflict, match=f"job {job_id} is run by elsewhere:7"):
         upgrade(fresh_url)
-    edit(fresh_url, f"{lease}'{year}-01-01 00:00:00'")
+    wrong = datetime(year, 1, 1, tzinfo=UTC)
+    edit(fresh_url, lease.format(wrong, wrong))
     assert upgrade(fresh_url) == NEWEST
 
 

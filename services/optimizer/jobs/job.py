@@ -155,7 +155,7 @@ QUARANTINE_AFTER: Final = 5
 """Consecutive crashes of runner processes before a job is quarantined."""
 
 LONGEST_LEASE_SECONDS: Final = 3600.0
-"""Upper bound on leases; a later end was written by a wrong clock."""
+"""Upper bound on leases."""
 
 LARGEST_BUDGET: Final = 1_000_000
 """In iterations, as in a spec."""

@@ -140,7 +140,7 @@ def entering(state: JobState, now: datetime) -> dict[str, Any]:
         "waiting": None,
     }
     if state not in (JobState.RUNNING, JobState.PAUSING):
-        columns |= {"lease_owner": None, "lease_expires_at": None}
+        columns |= {"lease_owner": None, "lease_renewed_at": None, "lease_expires_at": None}
     return columns
 
 

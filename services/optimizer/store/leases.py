@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, Final
 
 from sqlalchemy import ColumnElement, Connection, and_, delete, not_, or_, select
 
@@ -14,7 +14,6 @@ from gaitswarm.services.optimizer.errors import BudgetChanged, LeaseLost, NotFou
 from gaitswarm.services.optimizer.jobs.estimate import recent_pace
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration, JournalEntry
 from gaitswarm.services.optimizer.jobs.job import (
-    LONGEST_LEASE_SECONDS,
     QUARANTINE_AFTER,
     Claim,
     JobState,
@@ -46,6 +45,9 @@ from gaitswarm.services.optimizer.store.job_rows import (
 from gaitswarm.services.optimizer.store.recordings import load_recordings
 from gaitswarm.services.optimizer.store.tables import Row, jobs, journal
 
+_LARGEST_STEP: Final = timedelta(seconds=5)
+"""By how much the clock may be set back without ending a lease."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -62,11 +64,11 @@ class Leases(Aggregate):
     ) -> Claim | None:
         """Lease the oldest job of highest priority that is queued or whose lease has expired.
 
-        A lease that ends more than `LONGEST_LEASE_SECONDS` ahead, as a wrong clock wrote it, has
-        expired. The claimed job is running, under a token higher than any before. A pausing job
-        without a lease becomes paused, an unreadable one fails, and so does one whose runners have
-        crashed too often; none of them keeps others from being claimed. A lease that expires
-        without release counts as a crash until the next commit or resumption.
+        A lease that was renewed in the future, as a wrong clock wrote it, has expired. The claimed
+        job is running, under a token higher than any before. A pausing job without a lease becomes
+        paused, an unreadable one fails, and so does one whose runners have crashed too often; none
+        of them keeps others from being claimed. A lease that expires without release counts as a
+        crash until the next commit or resumption.
 
         Args:
             job_id: the only job to claim; None for any.
@@ -116,8 +118,7 @@ class Leases(Aggregate):
             The job's state and priority, which users may have changed.
         """
         with self._held("renew", claim) as (connection, row):
-            expires = self._clock(connection) + timedelta(seconds=lease_seconds)
-            changes: dict[str, Any] = {"lease_expires_at": expires}
+            changes: dict[str, Any] = _lease(self._clock(connection), lease_seconds)
             reason = None if waiting is None else storable(waiting)
             if reason != row["waiting"]:
                 changes["waiting"] = reason
@@ -259,9 +260,13 @@ def _claimed_row(connection: Connection, claim: Claim, committed: int | None) ->
 
 def has_live_lease(now: datetime) -> ColumnElement[bool]:
     """Match jobs with a lease that has not expired; see `Leases.claim`. Never NULL."""
-    expires = jobs.c.lease_expires_at
-    latest = now + timedelta(seconds=LONGEST_LEASE_SECONDS)
-    return and_(expires.is_not(None), expires > now, expires <= latest)
+    renewed, expires = jobs.c.lease_renewed_at, jobs.c.lease_expires_at
+    known = and_(renewed.is_not(None), expires.is_not(None))
+    return and_(known, renewed <= now + _LARGEST_STEP, expires > now)
+
+
+def _lease(now: datetime, seconds: float) -> dict[str, datetime]:
+    return {"lease_renewed_at": now, "lease_expires_at": now + timedelta(seconds=seconds)}
 
 
 def _take_or_end(
@@ -324,8 +329,8 @@ def take_job(
         "started_at": row["started_at"] or now,
         "lease_owner": runner,
         "lease_token": token,
-        "lease_expires_at": now + timedelta(seconds=lease_seconds),
         "crashes": crashes,
+        **_lease(now, lease_seconds),
     }
     job = to_job(update_job(connection, row, changes))
     taken_from = None if owner == runner else owner

@@ -78,6 +78,7 @@ jobs: Final = sa.Table(
     # The token never decreases; the owner is NULL while no runner holds the job.
     sa.Column("lease_owner", sa.Text),
     sa.Column("lease_token", sa.BigInteger, nullable=False),
+    sa.Column("lease_renewed_at", UtcDateTime),
     sa.Column("lease_expires_at", UtcDateTime),
     # Number of committed iterations, and index of the next.
     sa.Column("iterations", sa.Integer, nullable=False),

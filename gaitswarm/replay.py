@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.designs import WorldRequest
 from gaitswarm.services.optimizer.views import StatusName, View, finite, framed
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
-from gaitswarm.sim.replay import CONTROL_RATE, Replay
+from gaitswarm.sim.replay import CONTROL_RATE, SAMPLED, Replay
 from gaitswarm.sim.replay import replay as replayed
 from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.shapes import VisibleLink
@@ -29,18 +29,7 @@ _CHANNELS: Final[dict[str, tuple[str, str]]] = {
     "time": QUANTITIES["time"],
     "link_pose": ("m, 1", "every link in the world: x, y, z, then quaternion x, y, z, w"),
     "foot_position": ("m", "lower end of every leg in the world: x, y, z"),
-    **{
-        name: QUANTITIES[name]
-        for name in (
-            "foot_force",
-            "joint_angle",
-            "desired_angle",
-            "motor_angle",
-            "current",
-            "voltage",
-            "load_torque",
-        )
-    },
+    **{name: QUANTITIES[name] for name in SAMPLED},
     "body_acceleration": ("m/s2", "of the body in its own frame, without gravity: x, y, z"),
     "body_velocity": ("m/s, rad/s", "of the body in its own frame: 3 linear, then 3 angular"),
     "supply": QUANTITIES["supply"],

@@ -20,6 +20,18 @@ CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
 """Ticks of a log per second [Hz], the highest rate of a replay."""
 
 
+SAMPLED: Final = (
+    "foot_force",
+    "joint_angle",
+    "desired_angle",
+    "motor_angle",
+    "current",
+    "voltage",
+    "load_torque",
+)
+"""Columns of a log that a replay has at its rate, besides time and supply."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
     """A walk up to its end; arrays by frame: F frames of B links, J joints, L legs."""
@@ -63,19 +75,11 @@ def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Rep
     return Replay(
         duration=len(walked.time) * CONTROL_PERIOD,
         links=links,
-        time=walked.time[ticks],
         link_pose=poses,
         foot_position=feet,
-        foot_force=walked.foot_force[ticks],
-        joint_angle=walked.joint_angle[ticks],
-        desired_angle=walked.desired_angle[ticks],
-        motor_angle=walked.motor_angle[ticks],
-        current=walked.current[ticks],
-        voltage=walked.voltage[ticks],
-        load_torque=walked.load_torque[ticks],
         body_acceleration=walked.body_acceleration()[ticks],
         body_velocity=walked.base_velocity[ticks],
-        supply=walked.supply[ticks],
+        **{name: getattr(walked, name)[ticks] for name in ("time", *SAMPLED, "supply")},
     )
 
 

@@ -105,13 +105,18 @@ def test_its_page_shows_convergence_and_needs_no_network(proved: Proved) -> None
     assert "short" in page
 
 
-def test_a_job_that_has_committed_nothing_has_no_evidence(tmp_path: Path) -> None:
-    with gaitswarm.open(tmp_path / "new.db") as jobs:
+def test_a_job_that_has_committed_nothing_has_no_evidence(
+    tmp_path: Path, serve_database: Callable[[Path], str]
+) -> None:
+    db = tmp_path / "new.db"
+    with gaitswarm.open(db) as jobs:
         job = jobs.submit(**JOB)
-        with pytest.raises(gaitswarm.Conflict, match="no iteration yet"):
-            jobs.evidence(job.id)
-        with pytest.raises(gaitswarm.NotFound):
-            jobs.evidence("nosuchjob")
+    for opened in (gaitswarm.open(db), gaitswarm.connect(serve_database(db))):
+        with opened as jobs:
+            with pytest.raises(gaitswarm.Conflict, match="no iteration yet"):
+                jobs.evidence(job.id)
+            with pytest.raises(gaitswarm.NotFound):
+                jobs.evidence("nosuchjob")
 
 
 def test_a_server_sends_it_as_an_archive(proved: Proved, lasting_server: Server) -> None:

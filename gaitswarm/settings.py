@@ -95,8 +95,8 @@ class Settings(BaseModel):
     evaluator: EvaluatorKind = Field(
         default="auto",
         description="Where simulations run: on Ray (`ray`), in threads (`in-process`), or `auto`:"
-        " on the cluster at `ray_address`; without one, servers and runners start a local Ray, and"
-        " `optimize` uses threads.",
+        " on the cluster at `ray_address`; without one, servers and runners start a local Ray and"
+        " use threads until it is ready, and `optimize` uses threads.",
     )
     ray_address: str | None = Field(
         default=None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import signal
 import threading
@@ -15,7 +16,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from gaitswarm.services.optimizer.analysis.reference import note_reference
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER
 from gaitswarm.services.optimizer.run.embedded import run_embedded
@@ -36,8 +37,11 @@ from gaitswarm.sim.outcome import Outcome
 if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
+    from gaitswarm.services.worker.dispatch import Load
     from gaitswarm.services.worker.in_process import InProcessEvaluator
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+
+_log = logging.getLogger(__name__)
 
 
 def open_evaluator(
@@ -47,7 +51,7 @@ def open_evaluator(
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     lasting: bool = False,
-) -> InProcessEvaluator | RayEvaluator:
+) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
     """Create the evaluator of a kind."""
     from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
@@ -55,6 +59,9 @@ def open_evaluator(
     check_address(address)
     if kind == "in-process" or (kind == "auto" and address is None and not lasting):
         return InProcessEvaluator(cpus)
+    if kind == "auto" and address is None:
+        threads = InProcessEvaluator(cpus)
+        return AutoEvaluator(threads, RayEvaluator(cpus=threads.slots))
     ray = RayEvaluator(address, cpus=cpus)
     if lasting:
         ray.keep_open()
@@ -71,6 +78,55 @@ def check_address(address: str | None) -> None:
             " it loses its tasks with its connection; use HOST:6379, or auto on a node",
             field="ray_address",
         )
+
+
+class AutoEvaluator:
+    """`Evaluator` of servers and runners: threads until a local Ray is open, and while it is lost.
+
+    If Ray cannot be started, threads remain.
+    """
+
+    def __init__(self, threads: InProcessEvaluator, ray: RayEvaluator) -> None:
+        self._threads, self._ray = threads, ray
+        self._used: InProcessEvaluator | RayEvaluator = threads
+        self._without_ray = False
+
+    @property
+    def slots(self) -> int:
+        return self._threads.slots
+
+    @property
+    def place(self) -> str:
+        """Place of the last evaluation."""
+        return self._used.place
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        return self._threads.loads | self._ray.loads
+
+    @property
+    def on_ray(self) -> bool:
+        """Whether the next request runs on Ray."""
+        if self._without_ray:
+            return False
+        try:
+            return self._ray.is_open()
+        except EvaluatorUnavailable as error:
+            self._without_ray = True
+            _log.warning("%s; simulations continue in threads", error)
+            return False
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        self._used = self._ray if self.on_ray else self._threads
+        return self._used.evaluate(request, should_stop)
+
+    def close(self) -> None:
+        """End Ray and the threads. Idempotent."""
+        self._without_ray = True
+        self._threads.close()
+        self._ray.close()
 
 
 Observe = Callable[[EvaluationRequest], AbstractContextManager[OnTask]]

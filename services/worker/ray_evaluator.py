@@ -125,6 +125,17 @@ class RayEvaluator:
             self.close()
             raise
 
+    def is_open(self) -> bool:
+        """Return whether Ray is open; a lost connection begins to be opened again.
+
+        Raises EvaluatorUnavailable if Ray cannot be opened.
+        """
+        connection = self._connection
+        if not connection.opened.done():
+            return False
+        connection.opened.result()
+        return self._living() is connection
+
     def keep_open(self) -> None:
         """Open Ray again whenever it is lost, in a thread. Returns at once."""
         threading.Thread(target=self._reconnect, name="ray-reconnect", daemon=True).start()
@@ -182,7 +193,8 @@ class _Connection:
         self, address: str | None, cpus: int | None, *, after: _Connection | None = None
     ) -> None:
         self.opened: Future[None] = Future()
-        self.slots = 0 if address else cpus or available_cpus()
+        self._local = address is None
+        self.slots = (cpus or available_cpus()) if self._local else 0
         self.nodes = 0
         self._ended: str | None = None
         self._empty_since: float | None = None
@@ -219,6 +231,9 @@ class _Connection:
     def close(self) -> None:
         """Disconnect, and wait until that is done. Idempotent."""
         self._closing.set()
+        # Ray cannot be interrupted while it connects to a cluster.
+        if not (self._local or self.opened.done()):
+            return
         self._thread.join(_CLOSE_SECONDS)
         if self._thread.is_alive():
             _log.warning("Ray did not end within %.0f s", _CLOSE_SECONDS)

@@ -1,4 +1,4 @@
-"""Simulates on a local Ray, perhaps loses it, and closes it at a line of its input."""
+"""Simulates in threads, on Ray, perhaps loses it, and closes it at a line of its input."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import threading
 from contextlib import suppress
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.runtime import AutoEvaluator
 from gaitswarm.services.worker import ray_evaluator
+from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from tests.examples.processes import eventually
 from tests.worker.processes import descendants
@@ -22,23 +24,31 @@ def main() -> None:
     vars(ray_evaluator)["PULSE_SECONDS"] = 0.3
     wanted = request(20)
     expected = bits(walked_at_once(wanted))
-    evaluator = RayEvaluator(cpus=1)
+    evaluator = AutoEvaluator(InProcessEvaluator(1), RayEvaluator(cpus=1))
 
-    def evaluate() -> bool:
-        with suppress(EvaluatorUnavailable):
-            assert bits(evaluator.evaluate(wanted, never)) == expected
-            sys.stdout.write("ray\n")
-            sys.stdout.flush()
-            return True
-        return False
+    def evaluate(place: str) -> None:
+        assert evaluator.on_ray == (place == "ray")
+        assert bits(evaluator.evaluate(wanted, never)) == expected
+        sys.stdout.write(f"{place}\n")
+        sys.stdout.flush()
 
-    assert evaluate()
+    evaluate("threads")
+    eventually(lambda: evaluator.on_ray)
+    evaluate("ray")
     if "lose" in sys.argv:
         for process in descendants(os.getpid()):
             if "raylet/raylet" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
-        eventually(lambda: evaluator.lost)
-        eventually(evaluate)
+
+        def in_threads() -> bool:
+            with suppress(EvaluatorUnavailable):
+                assert bits(evaluator.evaluate(wanted, never)) == expected
+            return not evaluator.on_ray
+
+        eventually(in_threads)
+        evaluate("threads")
+        eventually(lambda: evaluator.on_ray)
+        evaluate("ray")
     sys.stdin.readline()
     os.kill(os.getpid(), signal.SIGTERM)
     if heard.wait(5.0):

@@ -1,7 +1,8 @@
-"""Choice of the evaluator, and evaluators that cannot be opened."""
+"""Simulations in threads until a local Ray has started."""
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Iterator
@@ -11,11 +12,12 @@ import pytest
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
-from gaitswarm.services.runtime import open_evaluator
+from gaitswarm.services.runtime import AutoEvaluator, open_evaluator
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.services.worker.ray_session import RaySession
-from tests.worker.requests import never, request
+from tests.examples.processes import eventually
+from tests.worker.requests import bits, never, request, walked_at_once
 
 
 class Opening:
@@ -39,20 +41,37 @@ def opening() -> Iterator[Opening]:
         slow.may_end.set()
 
 
-@pytest.mark.slow
-def test_requests_wait_for_a_local_ray_and_name_the_reason_if_it_cannot_be_started(
-    opening: Opening,
-) -> None:
+@pytest.fixture
+def auto(opening: Opening) -> Iterator[AutoEvaluator]:
     opened = open_evaluator(cpus=2, lasting=True)
-    assert isinstance(opened, RayEvaluator)
-    assert opening.begun.wait(5.0)
-    assert opened.slots == 2
-    assert opened.trouble() is None
-    threading.Timer(0.2, opening.may_end.set).start()
-    with pytest.raises(EvaluatorUnavailable, match="no memory"):
-        opened.evaluate(request(1), never)
-    assert "no memory" in str(opened.trouble())
+    assert isinstance(opened, AutoEvaluator)
+    yield opened
+    opening.may_end.set()
     opened.close()
+
+
+@pytest.mark.slow
+def test_threads_simulate_while_ray_is_started_and_when_it_cannot_be(
+    opening: Opening, auto: AutoEvaluator, caplog: pytest.LogCaptureFixture
+) -> None:
+    wanted = request(9)
+    assert opening.begun.wait(5.0)
+    assert bits(auto.evaluate(wanted, never)) == bits(walked_at_once(wanted))
+    assert not auto.on_ray
+    with caplog.at_level(logging.WARNING):
+        opening.may_end.set()
+        eventually(lambda: not auto.on_ray and bool(caplog.messages))
+        assert bits(auto.evaluate(wanted, never)) == bits(walked_at_once(wanted))
+    assert caplog.messages == [
+        "Ray cannot be started on this machine: no memory; simulations continue in threads"
+    ]
+
+
+@pytest.mark.slow
+def test_closing_ends_requests_in_threads(auto: AutoEvaluator) -> None:
+    threading.Timer(0.2, auto.close).start()
+    with pytest.raises(EvaluatorUnavailable, match="closed"):
+        auto.evaluate(request(500), never)
 
 
 def test_without_an_address_only_servers_and_runners_start_ray() -> None:

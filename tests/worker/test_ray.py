@@ -164,7 +164,7 @@ def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator
 
 @contextmanager
 def driver(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
-    """A process of its own that simulates on a local Ray, and perhaps loses it."""
+    """A process of its own that simulates in threads, on Ray, and perhaps loses it."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(folder)}
     # Kernels are those of this home, not compiled again.
     environment.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache"))
@@ -192,9 +192,9 @@ def steps_of(started: subprocess.Popen[str], count: int) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_local_ray_simulates_to_the_same_bits_and_leaves_nothing(tmp_path: Path) -> None:
+def test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing(tmp_path: Path) -> None:
     with driver(tmp_path) as started:
-        assert steps_of(started, 1) == ["ray"]
+        assert steps_of(started, 2) == ["threads", "ray"]
         below = descendants(started.pid)
         # Ray's own default; workers of other tests run at a higher priority.
         niceness = {os.getpriority(os.PRIO_PROCESS, p.pid) for p in walkers(started.pid)}
@@ -209,14 +209,14 @@ def test_a_local_ray_simulates_to_the_same_bits_and_leaves_nothing(tmp_path: Pat
 
 
 @pytest.mark.thorough(
-    "test_a_local_ray_simulates_to_the_same_bits_and_leaves_nothing",
+    "test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing",
 )
 @pytest.mark.slow
 def test_a_local_ray_whose_raylet_dies_is_opened_again_and_ends_with_its_process(
     tmp_path: Path,
 ) -> None:
     with driver(tmp_path, "lose") as started:
-        assert steps_of(started, 2) == ["ray", "ray"]
+        assert steps_of(started, 4) == ["threads", "ray", "threads", "ray"]
         titles = ("gcs_server", "raylet/raylet", "ray::")
         vital = [p for p in descendants(started.pid) if any(t in p.title for t in titles)]
         assert len(vital) >= 3

@@ -63,6 +63,7 @@ def test_a_log_is_uploaded_and_an_identification_submitted(
     expect(read).to_contain_text(
         "1.500 s in 750 rows. The walk starts 0 s into the log. 1 complete"
     )
+    expect(read).to_contain_text(re.compile("The log (validates|does not validate) the model"))
     expect(read.get_by_role("row").filter(has_text="I_M")).to_contain_text("18")
     recording = str(read.get_attribute("data-recording"))
     selected = page.locator(f"[data-item='{recording}']")

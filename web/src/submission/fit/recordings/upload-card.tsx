@@ -138,7 +138,8 @@ function studyOf(controller: Catalogue['controllers'][number], design: string): 
 const SAME_WALK = 0.95
 
 function ReadLog({ read }: { read: MeasuredWalk }) {
-  const { recording } = read
+  const { recording, verdict } = read
+  const failed = verdict.gates.filter(({ passed }) => !passed)
   return (
     <section class="stack-tight" aria-label="Log summary" data-recording={recording.id}>
       <p role="status">
@@ -153,6 +154,11 @@ function ReadLog({ read }: { read: MeasuredWalk }) {
         Correlation of its desired angles with the simulated ones:{' '}
         {formatNumber(read.correlation, 4)}
         {read.correlation < SAME_WALK && '. This is low: check scenario, cycles and design'}.
+      </p>
+      <p>
+        {verdict.validated
+          ? 'The log validates the model.'
+          : `The log does not validate the model. ${failed.map(({ quantity, reason }) => `${quantity}: ${reason}.`).join(' ')}`}
       </p>
       <Table
         caption="Signals of the log"

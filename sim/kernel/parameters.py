@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.actuators import DryFriction
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG, ContactLaw
 from gaitswarm.sim.robot.inertia import parallel_axis
 from gaitswarm.sim.scenario import Scenario
@@ -26,8 +27,11 @@ JAM_STIFFNESS: Final = 2000.0
 JAM_DAMPING: Final = 10.0
 """[N m s/rad]: about half of the critical damping of a coxa's rotor on the obstacle."""
 
-STATIC_FRICTION_RATE: Final = 0.02
-"""Joint rate from which a gearhead's static friction is full [rad/s]."""
+HOLDING_FREQUENCY: Final = 1000.0
+"""Of a rotor alone on the spring of its gear's dry friction [rad/s]; critically damped."""
+
+DRY_FRICTION: Final = tuple(DryFriction.model_fields)
+"""Fields of the parameters of dry friction, at the joints."""
 
 SHOVE_DURATION: Final = 0.1
 """Duration of a shove's constant force [s]."""
@@ -60,10 +64,11 @@ CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
 def internal_state_size(robot: Robot) -> int:
     """Return the length of a walk's internal state, which it carries besides q and v.
 
-    With backlash, angles [rad] and rates [rad/s] of the motors come first; then the state of the
-    contact law, foot by foot.
+    With backlash, angles [rad] and rates [rad/s] of the motors come first; then, with dry friction,
+    torques of its springs and torques last passed to the links [N m]; then the state of the contact
+    law, foot by foot.
     """
-    motors = 2 * robot.n_joints if robot.has_backlash else 0
+    motors = 2 * robot.n_joints * (robot.has_backlash + robot.has_dry_friction)
     law = CONTACT_LAWS[robot.description.contact_law]
     return motors + law.internal_state_size * len(robot.legs)
 
@@ -85,8 +90,8 @@ class Layout:
     supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every joint
     (J each), push (3: force on the body's origin along the world's axes, during a shove), backlash
     (J, with backlash) and displaced (1, with backlash: whether disturbances are angles),
-    static_friction (J, if the robot has any), and by foot (L each) the parameters of the contact
-    law.
+    `DRY_FRICTION` (J each, if the robot has any), and by foot (L each) the parameters of the
+    contact law.
 
     Attributes:
         by_limb: fields with values for each limb, and the number of these.
@@ -111,7 +116,7 @@ class Layout:
             "push": 3,
             "backlash": n_joints if robot.has_backlash else 0,
             "displaced": 1 if robot.has_backlash else 0,
-            "static_friction": n_joints if robot.has_static_friction else 0,
+            **dict.fromkeys(DRY_FRICTION, n_joints if robot.has_dry_friction else 0),
             **dict.fromkeys(law.parameters, n_feet),
         }
         limb = {n_joints: JOINTS_PER_LEG, n_feet: 1}
@@ -200,6 +205,9 @@ def pack_parameters(
         push=scenario.shove / SHOVE_DURATION * _towards(scenario.shove_direction),
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         displaced=float(displaced) if robot.has_backlash else np.empty(0),
-        static_friction=(actuators.static_friction if robot.has_static_friction else np.empty(0)),
+        **{
+            name: getattr(actuators, name) if robot.has_dry_friction else np.empty(0)
+            for name in DRY_FRICTION
+        },
         **by_foot,
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.kernel.parameters import STATIC_FRICTION_RATE
+from gaitswarm.sim.kernel.parameters import DRY_FRICTION
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.robot import JointActuators
 
@@ -22,30 +22,40 @@ class Drive:
 
     voltage: Floats  # [V]
     current: Floats  # [A]
-    torque: Floats  # at the gearheads' outputs, after friction [N m]
-    damping: Floats  # decrease of the torque per rate, without static friction [N m s/rad]
+    torque: Floats  # at the gearheads' outputs, after viscous friction [N m]
+    damping: Floats  # decrease of the torque per rate [N m s/rad]
 
 
-class _Friction:
-    """Friction of joints and gears. numbers: see `DcMotors`."""
+class DryFriction:
+    """Dry friction in numbers: the torque that would stop a joint, within its limit.
+
+    Attributes:
+        torques: on the joints in the last step (J,) [N m].
+        loads: passed to the links in the last step (J,) [N m].
+    """
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
-        self.viscous = numbers["viscous"]
-        self._static = numbers.get("static_friction", np.empty(0))
+        self._numbers = [numbers[name] for name in DRY_FRICTION]
+        self.torques, self.loads = np.zeros((2, self._numbers[0].size))
 
-    def behind(self, torque: Floats, rates: Floats) -> Floats:
-        """Torques [N m] reduced by friction at rates [rad/s] (J,)."""
-        torque = torque - self.viscous * rates
-        if self._static.size:
-            torque -= self._static * np.clip(rates / STATIC_FRICTION_RATE, -1.0, 1.0)
-        return torque
+    def limits(self, torque: Floats, rates: Floats) -> Floats:
+        """Largest friction (J,) [N m] at torques of the motors [N m] and rates [rad/s] (J,)."""
+        coulomb, stribeck, speed, share = self._numbers
+        slow = 1.0 / (1.0 + (rates / speed) ** 2)
+        limits: Floats = coulomb + stribeck * slow + share * np.abs(torque + self.loads)
+        return limits
+
+    @property
+    def memory(self) -> tuple[Floats, ...]:
+        """As the kernel's internal state: what its springs bear, and the loads."""
+        return (-self.torques, self.loads) if self.torques.size else ()
 
 
 class TorqueMotors:
     """Torque-controlled actuators: the command, limited by the speed."""
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
-        self._a, self._friction = actuators, _Friction(numbers)
+        self._a, self._viscous = actuators, numbers["viscous"]
         self._source = float(numbers["supply_voltage"][0])
         self._internal = float(numbers["supply_resistance"][0])
 
@@ -60,29 +70,27 @@ class TorqueMotors:
         on_the_line = (torque == most) | (torque == least)
         current = torque / a.torque
         voltage = a.resistance * current + a.torque * rates
-        damping = a.torque_drop * on_the_line + self._friction.viscous
-        return Drive(voltage, current, self._friction.behind(torque, rates), damping)
+        damping = a.torque_drop * on_the_line + self._viscous
+        return Drive(voltage, current, torque - self._viscous * rates, damping)
 
     def current_after(self, drive: Drive, faster: Floats) -> Floats:
-        after: Floats = (
-            drive.current - (drive.damping - self._friction.viscous) / (self._a.torque) * faster
-        )
+        after: Floats = drive.current - (drive.damping - self._viscous) / (self._a.torque) * faster
         return after
 
 
 class DcMotors:
     """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
 
-    numbers: `viscous`, optionally `static_friction`, `supply_voltage` and `supply_resistance`, as
-    in `sim.kernel.parameters.Layout`.
+    numbers: `viscous`, `DRY_FRICTION`, `supply_voltage` and `supply_resistance`, as in
+    `sim.kernel.parameters.Layout`.
     """
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
         self._k, self._r = actuators.torque, actuators.resistance
-        self._friction = _Friction(numbers)
+        self._viscous = numbers["viscous"]
         self._source = float(numbers["supply_voltage"][0])
         self._internal = float(numbers["supply_resistance"][0])
-        self._damping = self._k**2 / self._r + self._friction.viscous
+        self._damping = self._k**2 / self._r + self._viscous
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
         """The battery's voltage is U = source - internal sum(duty I)."""
@@ -93,7 +101,7 @@ class DcMotors:
         )
         voltage = duty * supply
         current = (voltage - back) / self._r
-        torque = self._friction.behind(self._k * current, rates)
+        torque = self._k * current - self._viscous * rates
         return Drive(voltage, current, torque, self._damping)
 
     def current_after(self, drive: Drive, faster: Floats) -> Floats:
@@ -115,10 +123,10 @@ the currents (J,) [A] for the same command and rates higher by `faster` (J,) [ra
 
 
 class FirmGears:
-    """Rotors that turn with the links."""
+    """Rotors that turn with the links; their dry friction is MuJoCo's."""
 
-    def __init__(self, robot: Robot, motors: Motors) -> None:
-        self.motors, self.armature = motors, robot.actuators().armature
+    def __init__(self, robot: Robot, motors: Motors, dry: DryFriction) -> None:
+        self.motors, self.dry, self.armature = motors, dry, robot.actuators().armature
 
     @property
     def memory(self) -> tuple[Floats, ...]:
@@ -145,12 +153,14 @@ class FirmGears:
 class LooseGears:
     """Separate rotors that touch the links at either end of a play through damped shafts."""
 
-    def __init__(self, robot: Robot, motors: Motors, play: Floats, angles: Floats) -> None:
+    def __init__(
+        self, robot: Robot, motors: Motors, dry: DryFriction, play: Floats, angles: Floats
+    ) -> None:
         actuators = robot.actuators()
-        self.motors, self._inertia = motors, actuators.armature
+        self.motors, self.dry, self._inertia = motors, dry, actuators.armature
         self._half = play / 2.0
         self._stiffness, self._damping = actuators.shaft_stiffness, actuators.shaft_damping
-        self.armature = np.zeros(robot.n_joints)
+        self._torque_constants, self.armature = actuators.torque, np.zeros(robot.n_joints)
         self.angles, self.rates = angles.copy(), np.zeros(robot.n_joints)
 
     @property
@@ -169,8 +179,15 @@ class LooseGears:
 
     def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
         """Motors damp at the given time of the step, shafts at its beginning."""
-        inertia = self._inertia + implicit * timestep * actuation.drive.damping
-        spin: Floats = (actuation.drive.torque - actuation.torque) / inertia
+        drive, dry = actuation.drive, self.dry
+        inertia = self._inertia + implicit * timestep * drive.damping
+        torque = drive.torque - actuation.torque
+        if dry.torques.size:
+            limits = dry.limits(drive.current * self._torque_constants, self.rates)
+            dry.torques = np.clip(-torque - inertia * self.rates / timestep, -limits, limits)
+            dry.loads = actuation.torque
+            torque = torque + dry.torques
+        spin: Floats = torque / inertia
         self.rates = self.rates + timestep * spin
         return spin
 
@@ -198,7 +215,7 @@ returning their accelerations [rad/s2], and `drift` turns for a time [s]."""
 def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gears:
     """Gears at rest, motors and links at the same angles. For numbers see `DcMotors`."""
     kind = TorqueMotors if robot.is_torque_controlled else DcMotors
-    motors = kind(robot.actuators(), numbers)
+    motors, dry = kind(robot.actuators(), numbers), DryFriction(numbers)
     if robot.has_backlash:
-        return LooseGears(robot, motors, numbers["backlash"], angles)
-    return FirmGears(robot, motors)
+        return LooseGears(robot, motors, dry, numbers["backlash"], angles)
+    return FirmGears(robot, motors, dry)

@@ -176,6 +176,7 @@ class _Stepper:
         self._gears = gears_of(robot, numbers, setup.start[7:])
         self._ground = GROUNDS[robot.description.contact_law](numbers)
         self._resistance = robot.actuators().resistance
+        self._torque_constants = robot.actuators().torque
         feet = [leg.foot for leg in robot.description.legs]
         self._feet = [int(m.site_bodyid[m.site(foot).id]) for foot in feet]
         self._displaced = bool(numbers["displaced"].any())
@@ -198,8 +199,9 @@ class _Stepper:
 
     @property
     def internal_state(self) -> Floats:
-        """Rotors, then the ground's memory."""
-        return np.concatenate([*self._gears.memory, self._ground.memory.ravel()])
+        """Rotors, dry friction, then the ground's memory."""
+        gears = self._gears
+        return np.concatenate([*gears.memory, *gears.dry.memory, self._ground.memory.ravel()])
 
     def landing(self, time: float) -> bool:
         """Whether a foot may touch down within a time [s]."""
@@ -241,6 +243,10 @@ class _Stepper:
             )
         if self._pushed:
             self._push_feet()
+        dry, firm = self._gears.dry, not self._gears.memory
+        if firm and dry.torques.size:
+            motors = self._torque_constants * actuation.drive.current
+            m.dof_frictionloss[6:] = dry.limits(motors, rates)
         (ahead_x, ahead_y), (x, y) = self._ahead.tolist(), self._velocity[:2].tolist()
         forward = (ahead_x * x + ahead_y * y) / math.hypot(ahead_x, ahead_y)
         mujoco.mj_fwdActuation(m, d)
@@ -251,7 +257,14 @@ class _Stepper:
         self._gears.kick(actuation, timestep)
         self._gears.drift(timestep)
         gain = self._acceleration
-        load = float(np.abs(torque - self._gears.armature * gain[6:]).sum())
+        if firm and dry.torques.size:
+            rows = slice(d.ne, d.ne + d.nf)
+            dry.torques[d.efc_id[rows] - 6] = d.efc_force[rows]
+            torque = torque + dry.torques
+        loads = torque - self._gears.armature * gain[6:]
+        if firm:
+            dry.loads = loads
+        load = float(np.abs(loads).sum())
         drive, acceleration, turn = actuation.drive, gain[:3], gain[3:6]
         current = np.abs(drive.current)
         power = drive.voltage * drive.current

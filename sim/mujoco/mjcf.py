@@ -103,7 +103,8 @@ def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
         impratio=repr(rig.friction_impedance),
     )
     if rig.soles == "none":
-        ET.SubElement(option, "flag", contact="disable", constraint="disable")
+        free = {} if robot.has_dry_friction else {"constraint": "disable"}
+        ET.SubElement(option, "flag", {"contact": "disable"} | free)
     world = ET.SubElement(root, "worldbody")
     if rig.looks:
         ET.SubElement(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
@@ -144,6 +145,10 @@ def _plane_height(contacts: Sequence[Contact], soles: Soles) -> float:
     return lengths.pop()
 
 
+_DRY_FRICTION: Final = {"solimpfriction": "0.9999 0.9999", "solreffriction": "0.0004 1"}
+"""MuJoCo's dry friction, almost hard: a held joint creeps at some 1e-6 rad/s."""
+
+
 def _add_leg(
     base: ET.Element, robot: Robot, number: int, drawn: Mapping[str, Sequence[Shape]]
 ) -> ET.Element:
@@ -152,6 +157,8 @@ def _add_leg(
     # With backlash, rotors do not turn with the links.
     rotors = np.zeros(robot.n_joints) if robot.has_backlash else robot.actuators().armature
     armature = dict(zip(robot.joint_names, rotors.tolist(), strict=True))
+    dry = robot.has_dry_friction and not robot.has_backlash
+    coulomb = dict(zip(robot.joint_names, robot.actuators().coulomb_friction.tolist(), strict=True))
     joints = {joint.name: joint for joint in urdf.joints}
     parent = base
     for name in leg.joints:
@@ -160,7 +167,7 @@ def _add_leg(
         turned = carrier.rotation @ joint.origin.matrix()
         at = carrier.rotation @ joint.origin.xyz + carrier.position
         parent = ET.SubElement(parent, "body", {"name": joint.child} | _placement(at, turned))
-        ET.SubElement(
+        element = ET.SubElement(
             parent,
             "joint",
             name=name,
@@ -169,6 +176,8 @@ def _add_leg(
             armature=repr(armature[name]),
             damping="0",
         )
+        if dry:
+            element.attrib |= _DRY_FRICTION | {"frictionloss": repr(coulomb[name])}
         _add_inertia(parent, urdf.bodies[joint.child])
         _add_shapes(parent, drawn.get(joint.child, ()))
     foot = urdf.place(leg.foot)

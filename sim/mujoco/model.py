@@ -114,8 +114,8 @@ def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
 
     It has the scenario's load and slope, joints with the motors' voltages [V] as controls (torques
     [N m] if torque-controlled), visible shapes, and a keyframe `start`, the pose at the beginning
-    of a walk through the scenario. Backlash, limits of torque by speed, the battery's sag and
-    static friction are omitted.
+    of a walk through the scenario. Backlash, limits of torque by speed, the battery's sag and,
+    of dry friction, all but `coulomb_friction` are omitted.
     """
     require_reachable(robot, scenario)
     surroundings = Surroundings.of(robot, scenario)

@@ -39,18 +39,37 @@ class Motor(Data):
     viscous_friction: Number = Field(ge=0.0, description="B_M [N m s/rad], motor side")
 
 
-class Gearhead(Data):
-    """A planetary gearhead; its losses are viscous and static friction on the output side."""
+class DryFriction(Data):
+    """Dry friction at a gear's output, which also holds the gear at rest.
+
+    The limit is coulomb_friction + stribeck_friction / (1 + (rate / stribeck_speed)^2) +
+    load_friction |torque of the motor + torque passed to the link|.
+    """
+
+    coulomb_friction: Number = Field(
+        default=0.0, ge=0.0, description="part independent of speed and load [N m]"
+    )
+    stribeck_friction: Number = Field(
+        default=0.0, ge=0.0, description="additional part at rest, halved at stribeck_speed [N m]"
+    )
+    stribeck_speed: Number = Field(
+        default=0.1, gt=0.0, description="speed at which stribeck_friction is halved [rad/s]"
+    )
+    load_friction: Number = Field(
+        default=0.0,
+        ge=0.0,
+        lt=1.0,
+        description="part of the sum of the torques on both sides of the gear [1]",
+    )
+
+
+class Gearhead(DryFriction):
+    """A planetary gearhead; its losses are viscous and dry friction on the output side."""
 
     ratio: Number = Field(gt=0.0, description="r_G [1]")
     nominal_torque: Number = Field(gt=0.0, description="M_NG [N m]")
     nominal_speed: Number = Field(gt=0.0, description="omega_NG [rad/s], motor side")
     efficiency: Number = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
-    static_friction: Number = Field(
-        default=0.0,
-        ge=0.0,
-        description="static friction at the output, independent of speed [N m]",
-    )
 
 
 def _is_default_kind(kind: str) -> bool:
@@ -89,7 +108,7 @@ class Actuator(Shaft):
     bevel: Number = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
 
 
-class TorqueActuator(Shaft):
+class TorqueActuator(Shaft, DryFriction):
     """A motor with field-oriented control behind a low gear ratio.
 
     Torque is proportional to current, so the current loop is assumed perfect. The motor is its
@@ -120,9 +139,6 @@ class TorqueActuator(Shaft):
         " falls to zero at speed_limit [rad/s]",
     )
     viscous_friction: Number = Field(default=0.0, ge=0.0, description="at the joint [N m s/rad]")
-    static_friction: Number = Field(
-        default=0.0, ge=0.0, description="static friction at the joint, independent of speed [N m]"
-    )
 
     @model_validator(mode="after")
     def _limits_go_together(self) -> TorqueActuator:

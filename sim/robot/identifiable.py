@@ -75,6 +75,8 @@ _CONTACT: Final = {
     ),
 }
 
+_DRY_FRICTION: Final = ("coulomb_friction", "stribeck_friction", "load_friction")
+
 CONVENTIONAL_VARIABLES: Final = (
     Variable(
         name="efficiency",
@@ -84,11 +86,25 @@ CONVENTIONAL_VARIABLES: Final = (
         description="Efficiency of every gearhead; that of a single joint takes precedence.",
     ),
     Variable(
-        name="static_friction",
+        name="coulomb_friction",
         low=0.0,
         high=1.0,
         unit="N m",
-        description="Static friction of every gearhead, at its output.",
+        description="Dry friction of every gearhead, at its output.",
+    ),
+    Variable(
+        name="stribeck_friction",
+        low=0.0,
+        high=1.0,
+        unit="N m",
+        description="Further dry friction at rest.",
+    ),
+    Variable(
+        name="load_friction",
+        low=0.0,
+        high=0.5,
+        unit="1",
+        description="Dry friction of every gearhead per torque on both its sides.",
     ),
     Variable(
         name="energy",
@@ -197,11 +213,10 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
     )
     parts = {
         "gearheads": {
-            name: changed(gear, "efficiency", "static_friction")
-            for name, gear in d.gearheads.items()
+            name: changed(gear, "efficiency", *_DRY_FRICTION) for name, gear in d.gearheads.items()
         },
         "actuators": {
-            name: changed(actuator, "static_friction")
+            name: changed(actuator, *_DRY_FRICTION)
             if isinstance(actuator, TorqueActuator)
             else actuator
             for name, actuator in d.actuators.items()

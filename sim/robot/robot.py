@@ -159,7 +159,10 @@ class JointActuators:
     motor_friction: Floats  # B_M r^2 [N m s/rad]
     gear_friction: Floats  # B_G at eta = 0 [N m s/rad], to be multiplied by 1 - eta
     efficiency: Floats  # eta [1]
-    static_friction: Floats  # of the gearhead, against the motion [N m]
+    coulomb_friction: Floats  # part of the dry friction's limit, constant [N m]
+    stribeck_friction: Floats  # part at rest [N m]
+    stribeck_speed: Floats  # at which the latter is halved [rad/s]
+    load_friction: Floats  # part per torque on both sides of the gear [1]
     backlash: Floats  # play, end to end [rad]
     shaft_stiffness: Floats  # of the closed play [N m/rad]
     shaft_damping: Floats  # of the closed play [N m s/rad]
@@ -214,8 +217,9 @@ class Robot:
         return self.description.actuator_kind == "torque"
 
     @property
-    def has_static_friction(self) -> bool:
-        return bool(self.actuators().static_friction.any())
+    def has_dry_friction(self) -> bool:
+        a = self.actuators()
+        return bool((a.coulomb_friction + a.stribeck_friction + a.load_friction).any())
 
     @property
     def body(self) -> BodyInertia:
@@ -271,7 +275,10 @@ def _dc_row(d: RobotDescription, actuator: Actuator) -> tuple[float, ...]:
         motor.viscous_friction * ratio**2,
         gear.nominal_torque * gear.ratio / gear.nominal_speed * actuator.bevel**2,
         gear.efficiency,
-        gear.static_friction * actuator.bevel,
+        gear.coulomb_friction * actuator.bevel,
+        gear.stribeck_friction * actuator.bevel,
+        gear.stribeck_speed / actuator.bevel,
+        gear.load_friction,
         actuator.backlash,
         actuator.shaft_stiffness,
         actuator.shaft_damping,
@@ -289,7 +296,10 @@ def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
         actuator.viscous_friction,
         0.0,
         1.0,
-        actuator.static_friction,
+        actuator.coulomb_friction,
+        actuator.stribeck_friction,
+        actuator.stribeck_speed,
+        actuator.load_friction,
         actuator.backlash,
         actuator.shaft_stiffness,
         actuator.shaft_damping,

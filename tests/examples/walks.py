@@ -132,7 +132,7 @@ torque_constant = 0.06
 resistance = 0.3
 rotor_inertia = 8e-5
 torque_limit = 12.0
-{knee}static_friction = 0.1
+{knee}coulomb_friction = 0.1
 backlash = {backlash}
 
 [actuators.tibia]

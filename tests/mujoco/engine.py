@@ -14,12 +14,12 @@ from gaitswarm.sim.kernel.walk import WalkResult
 from gaitswarm.sim.mujoco.kernel import MujocoKernel
 from gaitswarm.sim.mujoco.mjcf import Soles
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import RobotChoice, load_robot
+from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
 from gaitswarm.sim.scenario import Scenario
 
 
 def walk_in_mujoco(
-    variant: RobotChoice,
+    variant: RobotChoice | Robot,
     scenario: Scenario,
     controller: str,
     design: Mapping[str, float],
@@ -28,7 +28,7 @@ def walk_in_mujoco(
     soles: Soles = "none",
 ) -> tuple[NDArray[np.float64], WalkLog]:
     """Objectives f1 to f6 and log of one walk to its end."""
-    robot = load_robot(variant)
+    robot = variant if isinstance(variant, Robot) else load_robot(variant)
     coding, timestep = control_steps(robot)
     plan = plan_walk(robot, scenario, timestep)
     assert plan is not None

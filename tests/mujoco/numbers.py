@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.kernel.parameters import DRY_FRICTION
 from gaitswarm.sim.mujoco.gears import Gears, gears_of
 from gaitswarm.sim.mujoco.ground import GROUNDS, Ground
 from gaitswarm.sim.mujoco.mjcf import Surroundings
@@ -25,7 +26,10 @@ def own_gears(robot: Robot, angles: Floats) -> Gears:
         "viscous": actuators.viscous,
         "supply_voltage": np.array([supply.voltage]),
         "supply_resistance": np.array([supply.resistance]),
-        "static_friction": actuators.static_friction if robot.has_static_friction else np.empty(0),
+        **{
+            name: getattr(actuators, name) if robot.has_dry_friction else np.empty(0)
+            for name in DRY_FRICTION
+        },
         "backlash": actuators.backlash,
     }
     return gears_of(robot, numbers, angles)

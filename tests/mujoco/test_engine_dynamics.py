@@ -24,9 +24,9 @@ TIMESTEP = 2e-4
 DATASHEET = RobotVariant(name="szabadka2")
 
 
-def without_static_friction(files: RobotFiles) -> RobotFiles:
-    """Its slope is not in the leapfrog over here."""
-    return files.model_copy(update={"toml": files.toml.replace("static_friction = 0.1", "")})
+def without_dry_friction(files: RobotFiles) -> RobotFiles:
+    """The leapfrog over here has none."""
+    return files.model_copy(update={"toml": files.toml.replace("coulomb_friction = 0.1", "")})
 
 
 VARIANTS: dict[str, RobotChoice] = {
@@ -36,11 +36,11 @@ VARIANTS: dict[str, RobotChoice] = {
     "dead zone": DATASHEET.model_copy(update={"contact_law": "dead_zone"}),
     "stick": DATASHEET.model_copy(update={"contact_law": "stick"}),
     "default, stick and backlash": RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
-    "torque-controlled": without_static_friction(torque_quadruped_files()),
-    "torque-controlled, limited by voltage": without_static_friction(
+    "torque-controlled": without_dry_friction(torque_quadruped_files()),
+    "torque-controlled, limited by voltage": without_dry_friction(
         torque_quadruped_files(line=False)
     ),
-    "torque-controlled, backlash": without_static_friction(torque_quadruped_files(backlash=0.02)),
+    "torque-controlled, backlash": without_dry_friction(torque_quadruped_files(backlash=0.02)),
 }
 
 

@@ -14,6 +14,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples import walks
+from tests.examples.robots import changed
 from tests.mujoco.controllers import Coded, FuzzyPi, Pi
 from tests.mujoco.engine import walk_in_mujoco
 from tests.mujoco.walker import Controller, Floats, Trace, walk
@@ -196,3 +197,16 @@ def test_most_of_the_torques_difference_is_the_lever_of_the_sole() -> None:
         away[soles] = abs(found[0] / objectives[0] - 1.0)
     assert away["spheres"] < 0.25
     assert away["points"] < 0.5 * away["spheres"]
+
+
+@pytest.mark.variants("0.0")
+@pytest.mark.parametrize("backlash", [0.0, 0.02])
+def test_dry_friction_is_that_of_mujoco(backlash: float) -> None:
+    """Springs cut at the limit here, MuJoCo's constraint (or a clamped stop of rotors) there."""
+    friction = {"coulomb_friction": 0.1, "stribeck_friction": 0.1, "load_friction": 0.1}
+    robot = changed(load_robot(PLAIN), gearheads=friction, actuators={"backlash": backlash})
+    scenario, design = walks.short_walk(cycles=1.0, cycle_time=0.5), DRIVES["stiff PI"][1]
+    ours = walks.walk(scenario, design, "pi", robot=robot).outcome.objectives[0]
+    theirs, log = walk_in_mujoco(robot, scenario, "pi", design)
+    np.testing.assert_allclose(theirs[:5], ours[:5], rtol=0.01)
+    assert np.isfinite(log.current).all()

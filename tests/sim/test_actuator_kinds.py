@@ -121,5 +121,5 @@ def test_there_is_no_gearhead_to_be_identified() -> None:
     assert not any(name.startswith("efficiency") for name in names)
     with pytest.raises(SimulationInputError, match="efficiency: torque-controlled"):
         with_parameters(robot, {"efficiency": 0.5})
-    rubbing = with_parameters(robot, {"static_friction": 0.3})
-    assert set(rubbing.actuators().static_friction.tolist()) == {0.3}
+    rubbing = with_parameters(robot, {"coulomb_friction": 0.3})
+    assert set(rubbing.actuators().coulomb_friction.tolist()) == {0.3}

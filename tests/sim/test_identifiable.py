@@ -170,10 +170,11 @@ def test_the_slip_velocity_is_that_of_every_foot(name: str) -> None:
     assert changed.contacts()[-1].friction == 0.4
 
 
-def test_static_friction_is_that_of_every_gearhead() -> None:
-    robot = with_parameters(load_robot("szabadka2-identified"), {"static_friction": 0.3})
-    assert {gear.static_friction for gear in robot.description.gearheads.values()} == {0.3}
-    assert (robot.actuators().static_friction > 0.0).all()
+@pytest.mark.parametrize("name", ["coulomb_friction", "stribeck_friction", "load_friction"])
+def test_dry_friction_is_that_of_every_gearhead(name: str) -> None:
+    robot = with_parameters(load_robot("szabadka2-identified"), {name: 0.3})
+    assert {getattr(gear, name) for gear in robot.description.gearheads.values()} == {0.3}
+    assert robot.has_dry_friction
 
 
 def test_the_current_filter_is_that_of_the_sensors() -> None:

@@ -19,7 +19,7 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.native import load_kernel, native_kernel
 from gaitswarm.sim.kernel.observation import split_states
-from gaitswarm.sim.kernel.parameters import pack_parameters
+from gaitswarm.sim.kernel.parameters import HOLDING_FREQUENCY, pack_parameters
 from gaitswarm.sim.kernel.walk import WalkResult, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot, load_robot
@@ -156,13 +156,14 @@ def test_accelerations_agree_with_pinocchio_in_random_states(line: bool) -> None
         kinds.append(kind)
     supply, rng = robot.description.supply, np.random.default_rng(5)
     p = pack_parameters(robot, WALK, 2e-4)
+    springs = np.zeros(2 * robot.n_joints)
     limited, worst = 0, 0.0
     for _ in range(300):
         q, v = random_state(rng, robot.n_joints)
         v[6:] *= 5.0
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
         current, voltage, _, _, battery, found = (
-            np.array(part).ravel() for part in model.observe(q, v, [], duty, 0.0 * duty, p)
+            np.array(part).ravel() for part in model.observe(q, v, springs, duty, 0.0 * duty, p)
         )
         wanted = duty * np.array([kind.torque_limit for kind in kinds])
         k = np.array([kind.gear_ratio * kind.torque_constant for kind in kinds])
@@ -185,7 +186,8 @@ def test_accelerations_agree_with_pinocchio_in_random_states(line: bool) -> None
         np.testing.assert_allclose(current, torque / k, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(voltage, resistance * current + k * v[6:], rtol=1e-9, atol=1e-9)
         tau = np.zeros(oracle.model.nv)
-        rub = a.static_friction * np.clip(v[6:] / 0.02, -1.0, 1.0)
+        damper = 2.0 * HOLDING_FREQUENCY * a.armature * v[6:]
+        rub = np.clip(damper, -a.coulomb_friction, a.coulomb_friction)
         tau[oracle.v_index[6:]] = torque - a.viscous * v[6:] - rub
         external, _ = oracle.contact_forces(q, v)
         reference = pin.aba(oracle.model, oracle.data, oracle.q(q), oracle.v(v), tau, external)
@@ -218,7 +220,7 @@ def of_voltage(wanted: float, rate: float, k: float, resistance: float, supply: 
 def test_electrical_energy_is_heat_and_what_the_bodies_gain(timestep: float) -> None:
     """Free flight without friction: of the integrands, power less heat is the mechanical work."""
     files = torque_quadruped_files()
-    toml = files.toml.replace("viscous_friction = 0.02", "").replace("static_friction = 0.1", "")
+    toml = files.toml.replace("viscous_friction = 0.02", "").replace("coulomb_friction = 0.1", "")
     robot = load_robot(files.model_copy(update={"toml": toml}))
     model, oracle, rng = physics_model(robot), Oracle(robot), np.random.default_rng(3)
     q, v = random_state(rng, robot.n_joints)
@@ -249,7 +251,7 @@ def rotors_alone(rate: int) -> Robot:
     number = re.compile(r'(<mass value=|i[xyz]{2}=)"([^"]+)"')
     urdf = number.sub(lambda m: f'{m[1]}"{float(m[2]) * 1e-9!r}"', files.urdf)
     # No friction to speak of either, so that it shares its kernel with others.
-    toml = re.sub(r"(viscous|static)_friction = .*", r"\1_friction = 1e-15", files.toml)
+    toml = re.sub(r"(viscous|coulomb)_friction = .*", r"\1_friction = 1e-15", files.toml)
     heavy = toml.replace('name = "quadruped"', 'name = "quadruped"\nbody_mass = 1e9', 1)
     return load_robot(files.model_copy(update={"toml": heavy, "urdf": urdf}))
 

@@ -13,7 +13,7 @@ import casadi as ca
 
 from gaitswarm.sim.kernel.dynamics.electrical import supply_voltage
 from gaitswarm.sim.kernel.dynamics.spatial import Scalar
-from gaitswarm.sim.kernel.parameters import STATIC_FRICTION_RATE
+from gaitswarm.sim.kernel.parameters import DRY_FRICTION, HOLDING_FREQUENCY
 from gaitswarm.sim.robot.limbs import LimbJoint, is_torque_controlled
 
 
@@ -31,16 +31,6 @@ def shaft_torque(
     return forward + backward
 
 
-def static_friction(rate: Scalar, friction: Scalar) -> Scalar:
-    """Torque against the motion [N m]; linear in a narrow zone, so it never drives."""
-    return -friction * ca.fmin(ca.fmax(rate * (1.0 / STATIC_FRICTION_RATE), -1.0), 1.0)
-
-
-def static_friction_slope(rate: Scalar, friction: Scalar) -> Scalar:
-    """-d torque / d rate of `static_friction` [N m s/rad]."""
-    return friction * (ca.fabs(rate) < STATIC_FRICTION_RATE) * (1.0 / STATIC_FRICTION_RATE)
-
-
 @dataclass(frozen=True, slots=True)
 class Drive:
     """A motor with its gearhead in a step."""
@@ -49,6 +39,7 @@ class Drive:
     current: Scalar  # before the step [A]
     torque: Scalar  # behind the gearhead's friction, before the step [N m]
     damping: Scalar  # -d torque / d rate [N m s/rad]
+    spring: Scalar  # torque of dry friction's spring after the step [N m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,16 +51,69 @@ class TorqueDrive(Drive):
 
 
 @dataclass(frozen=True, slots=True)
+class DryFriction:
+    """Dry friction of a gear that holds its load at rest.
+
+    Below its limit it is a spring with a damper, so that a loaded joint comes to rest; at the limit
+    it slips. Spring and damper are in proportion to the rotor's inertia, so that a step resolves
+    them whatever the gear carries. The limit is that of Duclusaud et al., Extended Friction Models
+    for the Physics Simulation of Servo Actuators (2025), with Hess and Soom's curve of Stribeck
+    (1990).
+    """
+
+    coulomb: Scalar  # [N m]
+    stribeck: Scalar  # [N m]
+    stribeck_speed: Scalar  # [rad/s]
+    share: Scalar  # of the load [1]
+    spring: Scalar  # torque of the spring before the step [N m]
+    load: Scalar  # torque passed to the link in the step before [N m]
+
+    def limit(self, torque: Scalar, rate: Scalar) -> Scalar:
+        """Largest friction [N m] of a motor with a torque [N m] at the joint's rate [rad/s]."""
+        square, knee = rate * rate, self.stribeck_speed * self.stribeck_speed
+        return (
+            self.coulomb
+            + self.stribeck * (knee / (knee + square))
+            + self.share * ca.fabs(torque + self.load)
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Friction:
     """Friction of a joint and its gears."""
 
     viscous: Scalar  # [N m s/rad]
-    static: Scalar | None  # [N m]; None for none
+    dry: DryFriction | None
+    timestep: Scalar  # [s]
+
+    def behind(
+        self, joint: LimbJoint, torque: Scalar, damping: Scalar, rate: Scalar
+    ) -> tuple[Scalar, Scalar, Scalar]:
+        """Torque behind the friction, its damping, and the torque of the spring after the step."""
+        dry, inertia = self.dry, joint.armature
+        behind, damped = torque - self.viscous * rate, damping + self.viscous
+        if dry is None:
+            return behind, damped, 0.0
+        limit = dry.limit(torque, rate)
+        stretched = dry.spring + (HOLDING_FREQUENCY**2 * inertia) * (self.timestep * rate)
+        spring = ca.fmin(ca.fmax(stretched, -limit), limit)
+        # Not linearly implicit, so that friction stays within its limit over the whole step.
+        pull = spring + (2.0 * HOLDING_FREQUENCY * inertia) * rate
+        return behind - ca.fmin(ca.fmax(pull, -limit), limit), damped, spring
 
 
-def friction_of(joint: int, p: Mapping[str, Sequence[Scalar]]) -> Friction:
-    static = p["static_friction"]
-    return Friction(p["viscous"][joint], static[joint] if static else None)
+def friction_of(
+    joint: int,
+    p: Mapping[str, Sequence[Scalar]],
+    springs: Sequence[Scalar],
+    loads: Sequence[Scalar],
+    timestep: Scalar,
+) -> Friction:
+    dry = None
+    if springs:
+        coulomb, stribeck, speed, share = (p[name][joint] for name in DRY_FRICTION)
+        dry = DryFriction(coulomb, stribeck, speed, share, springs[joint], loads[joint])
+    return Friction(p["viscous"][joint], dry, timestep)
 
 
 def drive_of(
@@ -81,7 +125,7 @@ def drive_of(
     voltage = duty * supply
     current = (voltage - joint.torque * rate) * joint.conductance
     damping = joint.torque * joint.torque * joint.conductance
-    behind = _with_friction(joint.torque * current, damping, rate, friction)
+    behind = friction.behind(joint, joint.torque * current, damping, rate)
     return Drive(voltage, current, *behind)
 
 
@@ -98,19 +142,7 @@ def _torque_drive(
     drop = joint.torque_drop * limited
     current = joint.inverse_torque * torque
     voltage = joint.resistance * current + joint.torque * rate
-    return TorqueDrive(voltage, current, *_with_friction(torque, drop, rate, friction), drop)
-
-
-def _with_friction(
-    torque: Scalar, damping: Scalar, rate: Scalar, friction: Friction
-) -> tuple[Scalar, Scalar]:
-    """Torque behind a joint's friction, and its damping including that of the friction."""
-    torque = torque - friction.viscous * rate
-    damping = damping + friction.viscous
-    if friction.static is not None:
-        torque = torque + static_friction(rate, friction.static)
-        damping = damping + static_friction_slope(rate, friction.static)
-    return torque, damping
+    return TorqueDrive(voltage, current, *friction.behind(joint, torque, drop, rate), drop)
 
 
 def at_middle(joint: LimbJoint, drive: Drive, faster: Scalar) -> tuple[Scalar, Scalar]:

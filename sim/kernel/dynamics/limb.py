@@ -69,6 +69,8 @@ class LimbState:
     disturbance: Scalars  # torque on the link [N m], or angle [rad]
     motor_angles: Scalars = ()  # with backlash [rad]
     motor_rates: Scalars = ()  # with backlash [rad/s]
+    springs: Scalars = ()  # torques of dry friction's springs [N m]
+    loads: Scalars = ()  # torques passed to the links in the step before, with dry friction [N m]
     carried: Scalars = ()  # internal state of the foot's contact law
 
 
@@ -96,6 +98,7 @@ class Before:
     force: Force  # of the bias, in the body's frame
     held: Held
     motor_rates: Scalars  # after the step, with backlash
+    springs: Scalars  # after the step, with dry friction
     carried: Scalars  # after the step
     foot_force: Vector  # before the step, along the world's x, y, z [N]
 
@@ -176,6 +179,7 @@ def before(
             spins,
         ),
         tuple(rate + dt * spin for rate, spin in zip(state.motor_rates, spins, strict=True)),
+        tuple(drive.spring for drive in drives if state.springs),
         reaction.internal_state,
         (
             dot(foot.ahead, reaction.force),
@@ -259,7 +263,13 @@ def _drives(
 ) -> tuple[Drive, ...]:
     rates = state.motor_rates or state.rates
     return tuple(
-        drive_of(joint, duty, rate, environment.supply, friction_of(k, p))
+        drive_of(
+            joint,
+            duty,
+            rate,
+            environment.supply,
+            friction_of(k, p, state.springs, state.loads, environment.timestep),
+        )
         for k, (joint, duty, rate) in enumerate(zip(limb.joints, state.duty, rates, strict=True))
     )
 

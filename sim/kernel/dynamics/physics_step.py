@@ -201,7 +201,9 @@ def _step(
 ) -> _Step:
     n, law = robot.n_joints, robot.description.contact_law
     motors = s.internal_state[: 2 * n] if robot.has_backlash else []
-    carried = s.internal_state[len(motors) :]
+    rest = s.internal_state[len(motors) :]
+    springs, loads = (rest[:n], rest[n : 2 * n]) if robot.has_dry_friction else ([], [])
+    carried = rest[len(springs) + len(loads) :]
     joints = [joint for limb in limbs for joint in limb.joints]
     supply = battery_voltage(
         electrical_constants(joints),
@@ -221,7 +223,8 @@ def _step(
 
     before_of = _ByKind(limbs, limb_before, law, *layout.by_limb)
     after_of = _ByKind(limbs, after)
-    parts = s.q[7:], s.v[6:], s.duty, s.disturbance, motors[:n], motors[n:], carried
+    gears = motors[:n], motors[n:], springs, loads
+    parts = s.q[7:], s.v[6:], s.duty, s.disturbance, *gears, carried
     befores = [
         before_of(
             k,
@@ -252,6 +255,8 @@ def _step(
         internal_state=[
             *motors[:n],
             *(rate for limb in befores for rate in limb.motor_rates),
+            *(spring for limb in befores for spring in limb.springs),
+            *(load for limb in afters for load in limb.loads if springs),
             *(value for limb in befores for value in limb.carried),
         ],
         of_body=body_integrands(state, true, timestep),

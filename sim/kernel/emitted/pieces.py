@@ -98,8 +98,9 @@ class _Pieces:
         copy = "    for (int i = 0; i < {size}; i++) ({at})[i] = {of}[i];"
         size, copies = CONTACT_LAWS[self._law].internal_state_size, []
         if self._robot.has_backlash:
-            rates = f"internal + {self._n} + {JOINTS_PER_LEG} * l"
-            copies.append(copy.format(size=JOINTS_PER_LEG, at=rates, of="spun"))
+            copies.append(copy.format(size=JOINTS_PER_LEG, at=self._of_joints(1), of="spun"))
+        if self._robot.has_dry_friction:
+            copies.append(copy.format(size=JOINTS_PER_LEG, at=self._springs(), of="springs"))
         if size:
             copies.append(copy.format(size=size, at=self._carried("internal"), of="carried"))
         return copies
@@ -117,10 +118,11 @@ class _Pieces:
             limb = next(limb for limb, kind_of_limb in self._by_limb() if kind_of_limb == kind)
             first, second, held = self._limb_functions(limb, kind)
             self._held = max(self._held, held)
-            a = self._emit(f"before_{number}", first, ["gathered", "held[l]", "spun", "carried"])
-            b = self._emit(
-                f"after_{number}", second, ["v + 6 + 3 * l", "current + 3 * l", "tallies"]
+            a = self._emit(
+                f"before_{number}", first, ["gathered", "held[l]", "spun", "springs", "carried"]
             )
+            results = ["v + 6 + 3 * l", "current + 3 * l", "tallies", self._springs(1)]
+            b = self._emit(f"after_{number}", second, results)
             calls.append((f"    case {number}: {a} break;", f"    case {number}: {b} break;"))
         return calls
 
@@ -137,6 +139,13 @@ class _Pieces:
         if size is None:
             return _Input(where.stop - where.start, f"p + {where.start}")
         return _Input(size, f"p + {where.start} + {size} * l")
+
+    def _of_joints(self, number: int) -> str:
+        return f"internal + {number * self._n} + {JOINTS_PER_LEG} * l"
+
+    def _springs(self, further: int = 0) -> str:
+        """Springs of dry friction in the internal state, and one further the loads."""
+        return self._of_joints(2 * self._robot.has_backlash + further)
 
     def _carried(self, internal: str) -> str:
         size = CONTACT_LAWS[self._law].internal_state_size
@@ -211,7 +220,7 @@ class _Pieces:
     def _limb_functions(self, limb: Limb, kind: LimbKind) -> tuple[Any, Any, int]:
         """Return both functions of a kind of limb, and the number of values held between them."""
         n, backlash = JOINTS_PER_LEG, self._robot.has_backlash
-        moving = n if backlash else 0
+        moving, dry = n if backlash else 0, n if self._robot.has_dry_friction else 0
         constants = _Input(len(kind.numbers_of(limb)), "robot + start[l]")
         rates = _Input(n, "v + 6 + 3 * l")
         timestep = self._p("timestep")
@@ -223,7 +232,9 @@ class _Pieces:
             "duty": _Input(n, "duty + 3 * l"),
             "disturbance": _Input(n, "disturbance + 3 * l"),
             "motor_angles": _Input(moving, "internal + 3 * l"),
-            "motor_rates": _Input(moving, f"internal + {self._n} + 3 * l"),
+            "motor_rates": _Input(moving, self._of_joints(1)),
+            "springs": _Input(dry, self._springs()),
+            "loads": _Input(dry, self._springs(1)),
             "carried": _Input(
                 CONTACT_LAWS[self._law].internal_state_size, self._carried("internal")
             ),
@@ -261,9 +272,10 @@ class _Pieces:
             s["rates"],
             s["timestep"][0],
         )
-        outputs: list[Sequence[Scalar]] = [done.rates, done.currents, done.tallies]
+        loads = done.loads if dry else ()
+        outputs: list[Sequence[Scalar]] = [done.rates, done.currents, done.tallies, loads]
         # Only part of the held values is read later.
-        read = {x.element_hash() for o in outputs for x in ca.symvar(ca.vertcat(*o))}
+        read = {x.element_hash() for o in outputs if o for x in ca.symvar(ca.vertcat(*o))}
         read_later = [k for k, x in enumerate(s["held"]) if x.element_hash() in read]
         symbols_later["held"] = ca.vertcat(*(s["held"][k] for k in read_later))
         second = self._function(later, outputs, symbols_later)
@@ -272,6 +284,7 @@ class _Pieces:
             passed,
             [cut[k] for k in read_later],
             result.motor_rates,
+            result.springs,
             result.carried,
         ]
         return self._function(inputs, before_body, symbols, added=0), second, len(read_later)
@@ -335,7 +348,8 @@ static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec
 {{
   static const int start[{limbs}] = {{ {starts} }}, kind[{limbs}] = {{ {kinds} }};
   vec body[{body}], supply, held[{limbs}][{held}], gathered[{passed}];
-  vec spun[{joints}], carried[4], falling[6], of_body[3], tallies[{tallies}], total[5];
+  vec spun[{joints}], springs[{joints}], carried[4], falling[6], of_body[3], tallies[{tallies}];
+  vec total[5];
   {before_limbs}
   if (shoved) {{
     {push_body}

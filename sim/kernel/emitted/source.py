@@ -33,7 +33,7 @@ def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
         robot.n_joints,
         robot.description.contact_law,
         robot.has_backlash,
-        robot.has_static_friction,
+        robot.has_dry_friction,
         robot.is_torque_controlled,
     )
     kinds = limb_kinds(limbs_of(robot))

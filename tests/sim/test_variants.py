@@ -123,7 +123,7 @@ def resting_creep(law: ContactLaw) -> float:
     return float(np.linalg.norm(log.base_position[-1, :2] - log.base_position[500, :2]))
 
 
-@pytest.mark.thorough("test_it_is_linear_in_a_narrow_zone_and_full_against_the_motion_beyond")
+@pytest.mark.thorough("test_driven_on_the_ground_both_engines_accelerate_alike")
 def test_stick_holds_where_the_linear_zone_creeps() -> None:
     creep, hold = resting_creep("linear_zone"), resting_creep("stick")
     assert creep > 0.01

@@ -153,9 +153,11 @@ def unlike(host: str, refusal: str) -> ProvenanceChanged:
 def killed_workers(request: EvaluationRequest, chunk: Chunk) -> KilledWorker:
     """Return the error for a task of which workers die."""
     names = ", ".join(repr(request.cases[case].name) for case in chunk.cases)
+    first, last = chunk.start, chunk.stop - 1
+    designs = f"design {first}" if first == last else f"designs {first} to {last}"
     return KilledWorker(
-        f"{MOST_KILLED} worker processes died, one after the other, of the same task: designs"
-        f" {chunk.start} to {chunk.stop - 1} of the iteration in {names}. If their simulation is"
+        f"{MOST_KILLED} worker processes died, one after the other, of the same task: {designs}"
+        f" of the iteration in {names}. If their simulation is"
         " not at fault, the workers may lack memory; resume the job to try again"
     )
 

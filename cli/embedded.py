@@ -247,7 +247,8 @@ def _report(job: JobView, place: str, others: Mapping[str, JobView]) -> Parts:
         for name, evaluation in evaluations.items():
             yield f"fitness of {name}: {worth(evaluation)}"
         if job.gain is not None and job.reference is not None:
-            yield f"gain over {job.reference.kind} {job.reference.name}: {job.gain:.1%}"
+            published = "published " if job.reference.kind == "published" else ""
+            yield f"gain over {published}{job.reference.name}: {job.gain:.1%}"
         yield from search_line(job.best)
     rate = job.simulations_per_second
     speed = f" at {rate:.0f} simulations/s" if rate else ""

@@ -65,10 +65,8 @@ _log = logging.getLogger(__name__)
 class RayEvaluator:
     """`Evaluator` on Ray, which places tasks, retries them and scales.
 
-    Ray is opened in the background from construction on. If it is lost, the next `evaluate` opens
-    it again.
-
-    address, cpus: as for `open_ray`.
+    Ray is opened in the background from construction on, with the arguments of `open_ray`. If it is
+    lost, the next `evaluate` opens it again.
     """
 
     def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:
@@ -117,23 +115,17 @@ class RayEvaluator:
         """
         try:
             awaited(self._connection.opened, should_stop)
-        except EvaluationStopped:
-            # Ray cannot be interrupted while it connects.
-            threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
-            raise
-        except EvaluatorUnavailable:
+        except (EvaluationStopped, EvaluatorUnavailable):
             self.close()
             raise
 
     def is_open(self) -> bool:
-        """Return whether Ray is open; a lost connection begins to be opened again.
-
-        Raises EvaluatorUnavailable if Ray cannot be opened.
-        """
+        """Return whether Ray is open; raise EvaluatorUnavailable if it cannot be opened."""
         connection = self._connection
         if not connection.opened.done():
             return False
         connection.opened.result()
+        # A lost connection begins to be opened again.
         return self._living() is connection
 
     def keep_open(self) -> None:

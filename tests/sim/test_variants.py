@@ -57,8 +57,9 @@ def test_every_variant_walks_every_scenario(variant: RobotVariant, scenario: Sce
     outcome = simulate(scenario, "pi", ["P", "I"], PI, robot=variant).outcome
     plain = simulate(scenario, "pi", ["P", "I"], PI, robot="szabadka2").outcome
     assert outcome.statuses.tolist() == [Status.OK]
-    # Uphill the plain law creeps back by a tenth of these strides, and one that sticks does not.
-    near = 0.15 if variant is STICK and scenario.slope else 0.1
+    # Uphill the plain law creeps back by a tenth of these strides; one that sticks does not, and
+    # backlash costs as much again.
+    near = 0.15 if scenario.slope and (variant is STICK or variant.backlash) else 0.1
     assert outcome.objectives[0, 4] == pytest.approx(plain.objectives[0, 4], rel=near)
     assert (outcome.objectives != plain.objectives).all()
 

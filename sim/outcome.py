@@ -26,7 +26,7 @@ class Status(IntEnum):
 
     @property
     def label(self) -> str:
-        """Lower-case name, as printed and stored."""
+        """Lower-case name, as in texts and JSON."""
         return self.name.lower()
 
     @property
@@ -39,7 +39,7 @@ class Status(IntEnum):
         """Return the status of a label; raise KeyError if there is none.
 
         Args:
-            label: As printed and stored.
+            label: As in texts and JSON.
         """
         return cls[label.upper()]
 

@@ -8,12 +8,14 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import gaitswarm
 from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.evidence import MANIFEST
 from gaitswarm.evidence.archive import archived
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, JOB, Proved, tampered, with_cells
@@ -73,7 +75,7 @@ def test_a_single_job_run_twice_has_the_same_head(proved: Proved, tmp_path: Path
     ("statement", "problem"),
     [
         (
-            "UPDATE evaluations SET design = '[0.5, 0.25]' WHERE iteration = 1 AND particle = 2",
+            "UPDATE evaluations SET design = zeroblob(16) WHERE iteration = 1 AND particle = 2",
             "design 2 differs from the ask",
         ),
         (
@@ -118,15 +120,15 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     from gaitswarm.services.optimizer.store import open_store
 
     with closing(sqlite3.connect(copy)) as connection:
-        (text,) = connection.execute(
+        (content,) = connection.execute(
             "SELECT objectives FROM evaluations WHERE iteration = 0 AND particle = 1"
         ).fetchone()
-        objectives = json.loads(text)
-        # The last, loss of height, has no part in the fitness.
-        objectives[0][-1] *= 1.5
+        objectives = np.frombuffer(content).copy()
+        # Loss of height has no part in the fitness.
+        objectives[OBJECTIVE_NAMES.index("height_loss")] *= 1.5
         connection.execute(
             "UPDATE evaluations SET objectives = ? WHERE iteration = 0 AND particle = 1",
-            (json.dumps(objectives),),
+            (objectives.tobytes(),),
         )
         connection.commit()
     noted = digests(copy, proved.id)[-1]

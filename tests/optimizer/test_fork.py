@@ -304,7 +304,7 @@ def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: Store) -
 
 def test_a_job_of_failed_designs_has_nothing_to_start_from(store: Store, database: Path) -> None:
     job = parent(store)
-    edit(database, "UPDATE evaluations SET fitness = NULL")
+    edit(database, "UPDATE evaluations SET fitness = 9e999")
     with pytest.raises(Conflict, match="there is none to start from"):
         fork(store, job, 2, robot="szabadka2")
 

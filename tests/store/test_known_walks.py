@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from sqlalchemy import text
 
 from gaitswarm.services.optimizer.store import Store
@@ -49,11 +50,12 @@ def test_many_keys_are_asked_for_at_once(store: Store) -> None:
     assert set(store.known([*others, KEYS[1], *others])) == {KEYS[1]}
 
 
-def test_a_damaged_outcome_is_not_known(store: Store, database_url: str) -> None:
+@pytest.mark.parametrize("statuses", [b"", bytes([9, Status.OK])], ids=["missing", "unknown"])
+def test_a_damaged_outcome_is_not_known(store: Store, database_url: str, statuses: bytes) -> None:
     store.commit(begun(store, iterations=1), replace(completed(0), keys=KEYS), None)
     database = Database(database_url)
     with database.write() as connection:
-        labels = "UPDATE evaluations SET statuses = '[\"flew\"]' WHERE particle = 0"
-        connection.execute(text(labels))
+        damage = text("UPDATE evaluations SET statuses = :statuses WHERE particle = 0")
+        connection.execute(damage, {"statuses": statuses})
     database.close()
     assert set(store.known(KEYS)) == {KEYS[1]}

@@ -55,8 +55,9 @@ def test_a_database_without_schema_is_not_checked(fresh_url: str) -> None:
 def test_rows_that_refer_to_nothing_are_found(database: Path) -> None:
     with closing(sqlite3.connect(database)) as connection, connection:
         connection.execute(
-            "INSERT INTO evaluations (job_id, iteration, particle, design, objectives, statuses)"
-            " VALUES ('gone', 0, 0, '[]', '[]', '[]')"
+            "INSERT INTO evaluations"
+            " (job_id, iteration, particle, design, objectives, statuses, fitness)"
+            " VALUES ('gone', 0, 0, x'', x'', x'', 1.0)"
         )
     (finding,) = [found for found in check(str(database)) if "refers" in found]
     assert "of evaluations refers to a row of iterations that is not there" in finding

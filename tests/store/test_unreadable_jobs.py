@@ -288,8 +288,8 @@ def test_a_job_whose_ask_cannot_be_read_is_set_aside_too(
 ) -> None:
     first = begun(store)
     store.release(first, JobState.QUEUED)
-    statement = "UPDATE iterations SET positions = :document WHERE job_id = :id"
-    execute(database_url, statement, '{"somewhere": "else"}', first.job.id)
+    statement = "UPDATE iterations SET designs = 3 WHERE job_id = :id"
+    execute(database_url, statement, "", first.job.id)
     clock.advance(1.0)
     sound, _ = store.create_job(spec())
     claim = store.claim("runner", lease_seconds=LEASE)

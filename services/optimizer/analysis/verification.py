@@ -246,7 +246,7 @@ def _same(expected: Any, stored: Any) -> bool:
 
 def judged(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.float64]:
     """Return the (r,) fitness that follows from stored objectives."""
-    # Non-finite values are stored as null; they were infinite if the simulation succeeded.
+    # Non-finite values are stored as NaN; they were infinite if the simulation succeeded.
     lost = ~columns.failed[:, :, np.newaxis] & np.isnan(columns.objectives)
     with np.errstate(all="ignore"):
         objectives = np.where(lost, np.inf, columns.objectives)

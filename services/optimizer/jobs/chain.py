@@ -105,7 +105,7 @@ def ask_digest(positions: Floats, state: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Statuses:
-    """(...,) values of `Status`; hashed by label, as stored."""
+    """(...,) values of `Status`; hashed by label."""
 
     values: NDArray[np.uint8]
 
@@ -125,7 +125,7 @@ def _encode_map(encoder: CBOREncoder, value: dict[str, Any]) -> None:
 
 
 def _encode_floats(encoder: CBOREncoder, values: Floats) -> None:
-    """All non-finite values become one NaN, as they are stored as null."""
+    """All non-finite values become one NaN, as stored objectives are."""
     numbers = np.where(np.isfinite(values), values, np.nan).astype("<f8")
     encoder.encode(_array(numbers.shape, _FLOAT64, numbers.tobytes()))
 

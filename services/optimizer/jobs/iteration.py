@@ -111,7 +111,7 @@ class Iteration:
 class Ask:
     """An iteration to be evaluated, stored before evaluation.
 
-    Positions and state are stored as standard JSON, so every number in them is finite.
+    Every number in positions and state is finite; the state is stored as JSON.
     """
 
     iteration: int

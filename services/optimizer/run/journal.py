@@ -67,7 +67,7 @@ def _cached(
     return {
         key: outcome
         for key, outcome in stored.items()
-        # Infinities are stored as null.
+        # Infinities are stored as NaN.
         if outcome.objectives.shape in shapes
         and np.isfinite(outcome.objectives[outcome.statuses == Status.OK]).all()
     }

@@ -1,30 +1,24 @@
 """Committed iterations: writing, reading, and taking over in a fork
 
-Floats keep every bit. JSON has neither NaN nor infinity: a missing objective is null, and a fitness
-of +inf is NULL.
+Floats keep every bit, except that objectives that are not finite are stored as NaN.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import fields, replace
+from dataclasses import replace
 from datetime import datetime
-from functools import cache
 from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 from sqlalchemy import (
     ColumnElement,
     Connection,
     Table,
-    Text,
-    cast,
-    func,
     insert,
     select,
     update,
@@ -73,16 +67,10 @@ from gaitswarm.sim.outcome import Outcome, Status
 
 _LARGEST_INDEX: Final = 2**31 - 1
 
-_REEVALUATION: Final = tuple(field.name for field in fields(Reevaluation))
-"""Columns that are fields of `Reevaluation`."""
-
 _KEYS_AT_ONCE: Final = 1000
-_TEXTS_AT_ONCE: Final = 200
-"""Texts parsed at once; meanwhile no other Python thread runs."""
 _ITERATIONS_AT_ONCE: Final = 64
 
-_JSON: Final = TypeAdapter(Any)
-"""A faster parser than the standard library's, and as exact."""
+_STATUSES: Final = frozenset(Status)
 
 
 class History(Aggregate):
@@ -101,17 +89,9 @@ class History(Aggregate):
         """
         limit = checked_limit(limit)
         table = iterations.c
-        # Particles are counted from 0, and the primary key finds the last.
-        designs = select(func.max(evaluations.c.particle) + 1).where(
-            evaluations.c.job_id == table.job_id, evaluations.c.iteration == table.iteration
-        )
-        summary = (table[name] for name in SUMMARY)
+        names = ("designs", *SUMMARY, "evaluate_seconds", "committed_at", "digest")
         query = (
-            select(
-                table.iteration.label("index"),
-                designs.scalar_subquery().label("designs"),
-                *(*summary, table.evaluate_seconds, table.committed_at, table.digest),
-            )
+            select(table.iteration.label("index"), *(table[name] for name in names))
             .where(
                 table.job_id == job_id,
                 table.iteration > (-1 if after is None else _bounded(after)),
@@ -189,16 +169,15 @@ class History(Aggregate):
             keys: from `walk_keys`.
         """
         table, outcomes = evaluations.c, dict[bytes, Outcome]()
-        columns = (table.walk_key, cast(table.objectives, Text), cast(table.statuses, Text))
+        columns = (table.walk_key, table.objectives, table.statuses)
         with self._database.read("known") as connection:
             for first in range(0, len(keys), _KEYS_AT_ONCE):
                 some = table.walk_key.in_(keys[first : first + _KEYS_AT_ONCE])
-                for key, objectives, statuses in connection.execute(select(*columns).where(some)):
+                for row in connection.execute(select(*columns).where(some)).mappings():
                     # A damaged outcome is simulated again.
-                    with suppress(ValueError, TypeError, KeyError):
-                        numbers = np.array(_JSON.validate_json(objectives), dtype=np.float64)
-                        values = np.array(_statuses(statuses), dtype=np.uint8)
-                        outcomes[key] = Outcome(numbers, values)
+                    with suppress(ValueError, TypeError):
+                        if _STATUSES.issuperset(row["statuses"]):
+                            outcomes[row["walk_key"]] = _outcome(row)
         return outcomes
 
     def chain_documents(self, job_id: str) -> ChainDocuments:
@@ -229,42 +208,37 @@ def _between(table: Table, job_id: str, first: int, last: int) -> tuple[ColumnEl
 def _select_columns(
     connection: Connection, job_id: str, first: int, last: int
 ) -> EvaluationColumns | None:
-    """Parse the JSON of many rows at once, which is faster than row by row."""
     table = evaluations.c
-    documents = (table.design, table.objectives, table.statuses)
+    columns = (table.design, table.objectives, table.statuses, table.fitness)
     query = (
-        select(
-            *(table.iteration, table.particle, table.fitness),
-            # Both databases keep JSON as it was written.
-            *(cast(column, Text) for column in documents),
-        )
+        select(table.iteration, table.particle, *columns)
         .where(*_between(evaluations, job_id, first, last))
         .order_by(table.iteration, table.particle)
     )
     rows = connection.execute(query).all()
     if not rows:
         return None
-    iteration, particle, fitness, designs, objectives, statuses = zip(*rows, strict=True)
-    values = cache(_statuses)
+    iteration, particle, designs, objectives, statuses, fitness = zip(*rows, strict=True)
+    labels = np.frombuffer(b"".join(statuses), dtype=np.uint8).reshape(len(rows), -1)
     return EvaluationColumns(
         iteration=np.array(iteration, dtype=np.int64),
         particle=np.array(particle, dtype=np.int64),
-        designs=_parsed_numbers(designs),
-        objectives=_parsed_numbers(objectives),
-        statuses=np.array([values(text) for text in statuses], dtype=np.uint8),
-        fitness=np.array([math.inf if f is None else f for f in fitness], dtype=np.float64),
+        designs=_floats(b"".join(designs), len(rows)),
+        objectives=_floats(b"".join(objectives), *labels.shape),
+        statuses=labels,
+        fitness=np.array(fitness, dtype=np.float64),
     )
 
 
-def _parsed_numbers(texts: Sequence[str]) -> NDArray[np.float64]:
-    """Parse nested arrays, one per row; null is NaN."""
-    pieces = (texts[k : k + _TEXTS_AT_ONCE] for k in range(0, len(texts), _TEXTS_AT_ONCE))
-    parsed = (_JSON.validate_json(f"[{','.join(piece)}]") for piece in pieces)
-    return np.concatenate([np.array(numbers, dtype=np.float64) for numbers in parsed])
+def _floats(content: bytes, *shape: int) -> NDArray[np.float64]:
+    """Return an array of a shape and one more axis."""
+    return np.frombuffer(content, dtype="<f8").astype(np.float64).reshape(*shape, -1)
 
 
-def _statuses(text: str) -> list[int]:
-    return [Status.from_label(label) for label in _JSON.validate_json(text)]
+def _outcome(row: Row) -> Outcome:
+    """Return an outcome of a row of cases, or of designs in a case."""
+    statuses = np.frombuffer(row["statuses"], dtype=np.uint8)
+    return Outcome(_floats(row["objectives"], len(statuses)), statuses)
 
 
 def _select_reevaluations(
@@ -272,19 +246,12 @@ def _select_reevaluations(
 ) -> tuple[tuple[int, Reevaluation], ...]:
     query = select(reevaluations).where(*_between(reevaluations, job_id, first, last))
     query = query.order_by(reevaluations.c.iteration, reevaluations.c.particle)
-    rows = connection.execute(query).mappings()
-    return tuple(
-        (
-            row["iteration"],
-            Reevaluation(
-                particle=row["particle"],
-                objectives=np.array(row["objectives"], dtype=np.float64),
-                statuses=np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
-                fitness=math.inf if row["fitness"] is None else row["fitness"],
-            ),
-        )
-        for row in rows
-    )
+    found = []
+    for row in connection.execute(query).mappings():
+        outcome = _outcome(row)
+        again = Reevaluation(row["particle"], outcome.objectives, outcome.statuses, row["fitness"])
+        found.append((row["iteration"], again))
+    return tuple(found)
 
 
 def _select_links(connection: Connection, job_id: str, first: int, last: int) -> tuple[Link, ...]:
@@ -293,7 +260,7 @@ def _select_links(connection: Connection, job_id: str, first: int, last: int) ->
     return tuple(
         Link(
             row["iteration"],
-            np.array(row["positions"], dtype=np.float64),
+            _floats(row["positions"], row["designs"]),
             row["ask_digest"],
             row["digest"],
             row["committed_at"] is not None,
@@ -322,7 +289,7 @@ def _ask(connection: Connection, job_id: str, iteration: int) -> Ask | None:
     row = connection.execute(query).mappings().first()
     if row is None:
         return None
-    positions = np.array(row["positions"], dtype=np.float64)
+    positions = _floats(row["positions"], row["designs"])
     return Ask(row["iteration"], positions, row["optimizer_state"])
 
 
@@ -344,11 +311,14 @@ def insert_ask(
         raise Conflict(
             f"job {job['id']} asks for iteration {ask.iteration}, but its next is {expected}"
         )
+    if not np.isfinite(ask.positions).all():
+        raise ValueError(f"a position of iteration {ask.iteration} is not a finite number")
     connection.execute(
         insert(iterations).values(
             job_id=job["id"],
             iteration=ask.iteration,
-            positions=ask.positions.tolist(),
+            designs=len(ask.positions),
+            positions=ask.positions.astype("<f8").tobytes(),
             optimizer_state=ask.state,
             ask_digest=digest or ask_digest(ask.positions, ask.state),
             asked_at=now,
@@ -367,7 +337,7 @@ def complete_iteration(
     Returns:
         Changed columns of the job's row.
     """
-    asked = select(iterations.c.positions, iterations.c.ask_digest)
+    asked = select(iterations.c.designs, iterations.c.positions, iterations.c.ask_digest)
     open_iteration = _at(job["id"], done.iteration) & iterations.c.committed_at.is_(None)
     row = connection.execute(asked.where(open_iteration)).first()
     if row is None:
@@ -375,7 +345,7 @@ def complete_iteration(
             f"iteration {done.iteration} of job {job['id']} was not asked; its next is"
             f" {job['iterations']}"
         )
-    link = Link(done.iteration, np.array(row.positions, dtype=np.float64), row.ask_digest)
+    link = Link(done.iteration, _floats(row.positions, row.designs), row.ask_digest)
     previous = _at(job["id"], done.iteration - 1)
     connection.execute(update(iterations).where(previous).values(optimizer_state={}))
     return _insert_results(connection, job, chain_documents(job), link, done, now)
@@ -403,15 +373,20 @@ def _insert_results(
             **fitness_summary(done.fitness, best, job["best_fitness"]),
         )
     )
+    place = {"job_id": job["id"], "iteration": done.iteration}
     keys = done.keys or [None] * len(columns)
-    rows: Any = zip(*(array.tolist() for array in columns.arrays), keys, strict=True)
-    names = ("iteration", "particle", "design", "objectives", "statuses", "fitness", "walk_key")
-    values = [dict(zip(names, row, strict=True)) for row in rows]
-    connection.execute(insert(evaluations), [_result(job["id"], row) for row in values])
-    if done.reevaluation is not None:
-        again = {name: getattr(done.reevaluation, name) for name in _REEVALUATION}
-        row = _result(job["id"], again | {"iteration": done.iteration})
-        connection.execute(insert(reevaluations).values(**row))
+    designs = columns.designs.astype("<f8")
+    results = map(_result, columns.objectives, columns.statuses, columns.fitness.tolist())
+    rows = [
+        {**place, "particle": index, "design": design.tobytes(), "walk_key": key, **result}
+        for index, (design, key, result) in enumerate(zip(designs, keys, results, strict=True))
+    ]
+    connection.execute(insert(evaluations), rows)
+    again = done.reevaluation
+    if again is not None:
+        result = _result(again.objectives, again.statuses, again.fitness)
+        row = {**place, "particle": again.particle, **result}
+        connection.execute(insert(reevaluations).values(row))
     changes = {
         "head": digest,
         "iterations": done.iteration + 1,
@@ -423,20 +398,15 @@ def _insert_results(
     return changes
 
 
-def _result(job_id: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row of results; what JSON and SQL cannot hold is null."""
-    objectives = [[_number(value) for value in case] for case in values["objectives"]]
+def _result(
+    objectives: NDArray[np.float64], statuses: NDArray[np.uint8], fitness: float
+) -> dict[str, Any]:
+    """Return the columns of a design's results."""
     return {
-        **values,
-        "job_id": job_id,
-        "objectives": objectives,
-        "statuses": [Status(status).label for status in values["statuses"]],
-        "fitness": _number(values["fitness"]),
+        "objectives": np.where(np.isfinite(objectives), objectives, np.nan).astype("<f8").tobytes(),
+        "statuses": statuses.astype(np.uint8).tobytes(),
+        "fitness": fitness if math.isfinite(fitness) else math.inf,
     }
-
-
-def _number(value: float | np.floating[Any]) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def insert_entries(connection: Connection, job: Row, entries: Sequence[JournalEntry]) -> None:

@@ -1,8 +1,8 @@
 """Tables, the same on SQLite and PostgreSQL
 
-Columns are what is queried; the rest is JSON. A document that may outlive this code carries its own
-schema version (`JobSpec.schema_version`, the optimizer's state); arrays belong to the revision of
-the database.
+Columns are what is queried; the rest is JSON, and arrays of numbers are little-endian float64. A
+document that may outlive this code carries its own schema version (`JobSpec.schema_version`, the
+optimizer's state).
 """
 
 from __future__ import annotations
@@ -152,9 +152,10 @@ iterations: Final = sa.Table(
     metadata,
     sa.Column("job_id", sa.ForeignKey("jobs.id"), primary_key=True),
     sa.Column("iteration", sa.Integer, primary_key=True),
-    # The ask: (particles, d) positions and the optimizer's state, {} once a later iteration is
+    # The ask: (designs, d) positions and the optimizer's state, {} once a later iteration is
     # committed.
-    sa.Column("positions", sa.JSON, nullable=False),
+    sa.Column("designs", sa.Integer, nullable=False),
+    sa.Column("positions", sa.LargeBinary, nullable=False),
     sa.Column("optimizer_state", sa.JSON, nullable=False),
     sa.Column("asked_at", UtcDateTime, nullable=False),
     # The following are NULL until the iteration is committed, the statistics also if all designs
@@ -174,11 +175,11 @@ evaluations: Final = sa.Table(
     sa.Column("job_id", sa.Text, primary_key=True),
     sa.Column("iteration", sa.Integer, primary_key=True),
     sa.Column("particle", sa.Integer, primary_key=True),
-    # (v,) numbers; (K, m) numbers, null for NaN; (K,) labels; a fitness of +inf is NULL.
-    sa.Column("design", sa.JSON, nullable=False),
-    sa.Column("objectives", sa.JSON, nullable=False),
-    sa.Column("statuses", sa.JSON, nullable=False),
-    sa.Column("fitness", sa.Double),
+    # (v,) and (K, m) float64; K bytes, values of `Status`.
+    sa.Column("design", sa.LargeBinary, nullable=False),
+    sa.Column("objectives", sa.LargeBinary, nullable=False),
+    sa.Column("statuses", sa.LargeBinary, nullable=False),
+    sa.Column("fitness", sa.Double, nullable=False),
     # Key of the simulated design; NULL if the outcome was cached.
     sa.Column("walk_key", sa.LargeBinary, index=True),
     sa.ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
@@ -191,9 +192,9 @@ reevaluations: Final = sa.Table(
     sa.Column("job_id", sa.Text, primary_key=True),
     sa.Column("iteration", sa.Integer, primary_key=True),
     sa.Column("particle", sa.Integer, primary_key=True),
-    sa.Column("objectives", sa.JSON, nullable=False),
-    sa.Column("statuses", sa.JSON, nullable=False),
-    sa.Column("fitness", sa.Double),
+    sa.Column("objectives", sa.LargeBinary, nullable=False),
+    sa.Column("statuses", sa.LargeBinary, nullable=False),
+    sa.Column("fitness", sa.Double, nullable=False),
     sa.ForeignKeyConstraint(
         ["job_id", "iteration", "particle"],
         ["evaluations.job_id", "evaluations.iteration", "evaluations.particle"],
@@ -208,7 +209,7 @@ journal: Final = sa.Table(
     sa.Column("job_id", sa.Text, nullable=False, index=True),
     sa.Column("iteration", sa.Integer, nullable=False),
     sa.Column("case_index", sa.Integer, nullable=False),
-    # n keys of designs; (n, m) float64, little-endian; n statuses.
+    # n keys of designs; (n, m) float64; n bytes, values of `Status`.
     sa.Column("keys", sa.LargeBinary, nullable=False),
     sa.Column("objectives", sa.LargeBinary, nullable=False),
     sa.Column("statuses", sa.LargeBinary, nullable=False),

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from gaitswarm import GaitswarmError, Interrupted
 from gaitswarm.plugins import SimulationInputError
+from gaitswarm_research.compare.bbob import bbob
 from gaitswarm_research.compare.command import compare
 from gaitswarm_research.reconstruction.command import reconstruction
 from gaitswarm_research.studies.accuracy import noise, steps, tables
@@ -31,6 +32,7 @@ def research() -> None:
 
 
 app.command()(compare)
+app.command()(bbob)
 app.command()(reconstruction)
 study = typer.Typer(
     no_args_is_help=True,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gaitswarm import JobSpec, simulate
 from gaitswarm.plugins import Space
+from gaitswarm_research.compare.coco import CocoProblem
 from gaitswarm_research.compare.functions import ACCEPTANCE, FUNCTIONS, BenchmarkFunction, draw
 
 Floats = NDArray[np.float64]
@@ -104,7 +105,9 @@ NAMES: Final = (*FUNCTIONS, *WALKING)
 
 @cache
 def problem(name: str) -> Problem:
-    """Return the problem of a name."""
+    """Return the problem of a name, a function of COCO's suites included."""
+    if name.startswith("bbob"):
+        return CocoProblem(name)
     if name in FUNCTIONS:
         return FunctionProblem(FUNCTIONS[name])
     return WalkingProblem(**WALKING[name])

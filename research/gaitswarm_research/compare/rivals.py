@@ -81,14 +81,14 @@ def scipy_de(space: Space, seed: int, evaluate: Evaluate) -> None:
 def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
     """Search by the library cma with sigma 0.3, restarted with twice the offspring (IPOP).
 
-    It begins with 12 offspring. Integers are in their own units and keep a smallest step.
+    It begins in the middle of the box. Integers are in their own units and keep a smallest step.
     """
     cma = import_module("cma")
     discrete = space.integer | space.categorical
     low = np.where(discrete, space.low, 0.0)
     high = np.where(discrete, space.high, 1.0)
     generator = np.random.default_rng(seed)
-    offspring = 12
+    mean, offspring = (low + high) / 2.0, 4 + int(3.0 * np.log(space.dimension))
     while True:
         options = {
             "bounds": [low.tolist(), high.tolist()],
@@ -102,9 +102,7 @@ def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
         }
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            strategy = cma.CMAEvolutionStrategy(
-                low + generator.random(space.dimension) * (high - low), 0.3, options
-            )
+            strategy = cma.CMAEvolutionStrategy(mean, 0.3, options)
             while not strategy.stop():
                 asked = strategy.ask()
                 points = np.array(asked)
@@ -112,12 +110,51 @@ def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
                 clipped = np.clip(positions, space.low, space.high)
                 whole = np.where(discrete, np.rint(clipped), clipped)
                 strategy.tell(asked, _told(evaluate(space.positions(whole))).tolist())
+        mean = low + generator.random(space.dimension) * (high - low)
         offspring *= 2
 
 
+def catcmawm(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by CatCMAwM of the library cmaes, restarted with twice the population (IPOP).
+
+    Integers of two values are choices, as its documentation recommends.
+    """
+    method = import_module("cmaes").CatCMAwM
+    choices = space.categorical | (space.integer & (space.span < 2.0))
+    integers = space.integer & ~choices
+    real = ~(integers | choices)
+    counts = [round(span) + 1 for span in space.span.tolist()]
+    spaces = {
+        "x_space": [[0.0, 1.0]] * int(real.sum()) or None,
+        "z_space": [list(range(counts[j])) for j in np.flatnonzero(integers)] or None,
+        "c_space": [counts[j] for j in np.flatnonzero(choices)] or None,
+    }
+    population, generator = None, np.random.default_rng(seed)
+    while True:
+        strategy = method(**spaces, population_size=population, seed=int(generator.integers(2**31)))
+        while choices.all() or not strategy.should_stop():
+            asked = [strategy.ask() for _ in range(strategy.population_size)]
+            unit = np.empty((len(asked), space.dimension))
+            for row, solution in zip(unit, asked, strict=True):
+                row[real] = solution.x
+                row[integers] = solution.z
+                row[choices] = () if solution.c is None else solution.c.argmax(axis=1)
+            positions = space.low + np.where(real, unit * space.span, unit)
+            fitness = _told(evaluate(space.positions(positions))).tolist()
+            with warnings.catch_warnings(), np.errstate(all="ignore"):
+                warnings.simplefilter("ignore", RuntimeWarning)
+                strategy.tell(list(zip(asked, fitness, strict=True)))
+        population = 2 * strategy.population_size
+
+
 def optuna_tpe(space: Space, seed: int, evaluate: Evaluate) -> None:
-    """Search by Optuna's TPE sampler with its constant liar, in batches of 25."""
-    _study("TPESampler", {"constant_liar": True}, 25, space, seed, evaluate)
+    """Search by Optuna's default, the multivariate TPE sampler, one design at a time."""
+    _study("TPESampler", {}, 1, space, seed, evaluate)
+
+
+def optuna_gp(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by Optuna's Gaussian process sampler, one design at a time."""
+    _study("GPSampler", {}, 1, space, seed, evaluate)
 
 
 def optuna_cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
@@ -130,8 +167,10 @@ def optuna_cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
 
 
 RIVALS: Final[Mapping[str, tuple[Callable[[Space, int, Evaluate], None], str]]] = {
+    "catcmawm": (catcmawm, "cmaes"),
     "cma": (cma_es, "cma"),
     "optuna-cma-es": (optuna_cma_es, "cmaes optuna"),
+    "optuna-gp": (optuna_gp, "optuna scipy torch"),
     "optuna-tpe": (optuna_tpe, "optuna scipy"),
     "pymoo-pso": (pymoo_pso, "pymoo"),
     "scipy-de": (scipy_de, "scipy"),

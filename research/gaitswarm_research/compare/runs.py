@@ -199,7 +199,7 @@ class _Ended(Exception):
 
 
 @dataclass(slots=True)
-class _Recorder:
+class Recorder:
     """Evaluates what a search asks for, and records every improvement."""
 
     task: Task
@@ -241,19 +241,24 @@ class _Recorder:
         return tuple(float(f"{v:.9g}") if math.isfinite(v) else math.nan for v in curve)
 
 
-def execute(task: Task) -> Run:
-    """Execute a run."""
-    began = time.process_time()
-    recorder = _Recorder(task)
+def search(task: Task) -> Recorder:
+    """Search until the budget is spent or the target reached."""
+    recorder = Recorder(task)
     space = problem(task.problem).space
     with suppress(_Ended):
         if task.method in RIVALS:
             RIVALS[task.method][0](space, task.seed, recorder.evaluate)
         settings = json.loads(task.settings) if task.settings else task.method
-        search = create_search(settings, space, task.evaluations, task.seed)
+        method = create_search(settings, space, task.evaluations, task.seed)
         while True:
-            positions = search.ask(task.evaluations - search.evaluations)
-            search.tell(recorder.evaluate(positions))
+            method.tell(recorder.evaluate(method.ask(task.evaluations - method.evaluations)))
+    return recorder
+
+
+def execute(task: Task) -> Run:
+    """Execute a run."""
+    began = time.process_time()
+    recorder = search(task)
     to_best = float(recorder.improvements[-1][0]) if recorder.improvements else math.nan
     libraries = RIVALS[task.method][1].split() if task.method in RIVALS else []
     versions = " ".join(f"{name} {_version(name)}" for name in ("gaitswarm", "numpy", *libraries))

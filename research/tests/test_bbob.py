@@ -1,0 +1,67 @@
+"""The comparison on COCO's suites: problems, score and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from gaitswarm import InvalidRequest
+from gaitswarm_research.compare.bbob import shares, tasks
+from gaitswarm_research.compare.coco import TARGETS
+from gaitswarm_research.compare.problems import problem
+from gaitswarm_research.compare.runs import Task
+from gaitswarm_research.main import app
+
+
+def mean_share(suite: str, method: str) -> float:
+    """Share of targets at the end of 50 evaluations per variable, with five variables."""
+    plan = tasks(suite, "5", method, instances=1, budget=50, seed=1)  # type: ignore[arg-type]
+    return float(np.mean([shares(task)[1] for task in plan]))
+
+
+def test_a_problem_has_the_bounds_integers_and_minimum_of_its_suite() -> None:
+    mixed = problem("bbob-mixint_f001_i01_d05")
+    assert mixed.space.high.tolist() == [1.0, 3.0, 7.0, 15.0, 5.0]
+    assert mixed.space.integer.tolist() == [True] * 4 + [False]
+    assert mixed.target is not None
+    designs = mixed.space.designs(mixed.space.from_unit(np.full((2, 5), 0.5)))
+    values = mixed.fitness(designs, seed=1, first=0)
+    distances = mixed.final(designs, values)
+    assert (distances > 0.0).all()
+    np.testing.assert_allclose(values - distances, mixed.target - TARGETS[-1])
+
+
+def test_the_score_counts_targets_after_half_of_the_budget_and_at_its_end() -> None:
+    # The linear slope, whose minimum is at a corner.
+    half, end = shares(Task("bbob_f005_i01_d05", "cma-es", "", 250, 0, 1))
+    assert 0.0 <= half <= end == 1.0
+    assert shares(Task("bbob_f005_i01_d05", "random", "", 2, 0, 1)) <= (0.2, 0.2)
+
+
+@pytest.mark.parametrize("suite", ["bbob", "bbob-mixint"])
+def test_cma_es_reaches_far_more_targets_than_random_search(suite: str) -> None:
+    assert mean_share(suite, "cma-es") > 2.0 * mean_share(suite, "random")
+
+
+def test_the_command_prints_shares_by_method_and_dimension(tmp_path: Path) -> None:
+    path = tmp_path / "runs.csv"
+    arguments = ["--dimensions", "2,3", "--budget", "4", "--methods", "random", "--instances", "1"]
+    result = CliRunner().invoke(
+        app, ["bbob", *arguments, "--processes", "1", "-o", str(path), "--json"]
+    )
+    assert result.exit_code == 0, result.output
+    assert set(json.loads(result.output)["random"]) == {"2", "3"}
+    assert len(path.read_text().splitlines()) == 49
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "methods", "message"),
+    [("5,7", "de", "'7' is not one of 5, 10"), ("5", "psoo", "unknown method 'psoo'")],
+)
+def test_wrong_arguments_are_refused(dimensions: str, methods: str, message: str) -> None:
+    with pytest.raises(InvalidRequest, match=message):
+        tasks("bbob-mixint", dimensions, methods, instances=1, budget=50, seed=1)

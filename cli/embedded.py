@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import Parts, Printed, note, show
 from gaitswarm.cli.progress import Progress, show_progress
-from gaitswarm.cli.tables import design_table, results_table, search_line, worth
+from gaitswarm.cli.tables import design_table, results_table, search_line, verdict_lines, worth
 from gaitswarm.jobs.database import DatabaseJobs, check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.services.optimizer.analysis.reference import note_reference
@@ -29,6 +29,7 @@ from gaitswarm.settings import read_settings
 
 if TYPE_CHECKING:
     from gaitswarm.cli.options import WorkerOptions
+    from gaitswarm.services.optimizer.analysis.verdict import VerdictView
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
@@ -205,7 +206,9 @@ def finish(
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)
         raise KeyboardInterrupt
-    show(job, _report(job, jobs.place, others), as_json=as_json)
+    verdict = jobs.verdict(job_id)
+    document = {**job.model_dump(mode="json"), "verdict": verdict}
+    show(document, _report(job, verdict, jobs.place, others), as_json=as_json)
     if job.state is not JobState.SUCCEEDED:
         raise ended(job, jobs.place)
 
@@ -236,7 +239,7 @@ def _resume_hint(job_id: str, place: str) -> str:
     return f"to resume, run\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(job: JobView, place: str, others: Mapping[str, JobView]) -> Parts:
+def _report(job: JobView, verdict: VerdictView, place: str, others: Mapping[str, JobView]) -> Parts:
     if job.best is None:
         yield "no design walks in every scenario"
     else:
@@ -246,10 +249,9 @@ def _report(job: JobView, place: str, others: Mapping[str, JobView]) -> Parts:
         yield results_table({k: e.scenarios for k, e in evaluations.items()}, job.objectives)
         for name, evaluation in evaluations.items():
             yield f"fitness of {name}: {worth(evaluation)}"
-        if job.gain is not None and job.reference is not None:
-            published = "published " if job.reference.kind == "published" else ""
-            yield f"gain over {published}{job.reference.name}: {job.gain:.1%}"
         yield from search_line(job.best)
+        if job.kind == "tuning":
+            yield from verdict_lines(verdict, place)
     rate = job.simulations_per_second
     speed = f" at {rate:.0f} simulations/s" if rate else ""
     saved = f"; {job.evaluations_saved} of them cached" if job.evaluations_saved else ""

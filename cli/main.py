@@ -73,7 +73,7 @@ _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
         *(jobs.cancel, jobs.fork, jobs.label, jobs.keep, jobs.delete, jobs.diff, serve.runner),
     ),
     "Analysis of jobs": (
-        *(analysis.rank, analysis.front, analysis.importance),
+        *(analysis.verdict, analysis.rank, analysis.front, analysis.importance),
         *(analysis.failures, analysis.preferences, "plot"),
         *(evidence.export, evidence.evidence, evidence.verify),
     ),

@@ -42,6 +42,15 @@ def name_and_value(entry: str, option: str, form: str = "NAME=VALUE") -> tuple[s
     return name.strip(), value.strip()
 
 
+def name_and_bounds(entry: str, option: str) -> tuple[str, tuple[str, str]]:
+    """Split NAME=LOW:HIGH."""
+    name, value = name_and_value(entry, option, "NAME=LOW:HIGH")
+    low, colon, high = value.partition(":")
+    if not colon:
+        raise InvalidRequest(f"{entry!r} is not NAME=LOW:HIGH", field=option)
+    return name, (low, high)
+
+
 def full_id(jobs: Jobs, prefix: str) -> str:
     """Return the only id with a prefix, or the text itself if there is none."""
     if not 0 < len(prefix) < _LENGTH:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         ObjectiveView,
         ScenarioResultView,
     )
+    from gaitswarm.services.optimizer.analysis.verdict import FigureView, VerdictView
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -296,6 +297,37 @@ def best_parts(best: BestView, job: JobView) -> Parts:
     yield design_table(job.spec, {"best": best.design})
     yield results_table({"best": best.scenarios}, job.objectives)
     yield from search_line(best)
+
+
+def verdict_lines(verdict: VerdictView, place: str) -> Iterator[str]:
+    """Yield the verdict on a job's best design in words, and the command for wider bounds."""
+    yield from verdict.sentences
+    if verdict.reason is not None:
+        yield f"no gain: {verdict.reason}"
+    if verdict.widen is not None:
+        yield f"to queue a search within wider bounds, run\n  {verdict.widen}{place}"
+
+
+def verdict_table(verdict: VerdictView) -> Table:
+    """Return a table of values by scenario, each with its change against the reference."""
+    scenarios = dict.fromkeys(name for q in verdict.quantities for name in q.scenarios)
+    rows = [
+        [name, *(_change(quantity.scenarios.get(name)) for quantity in verdict.quantities)]
+        for name in scenarios
+    ]
+    heads = (f"{SHORT.get(q.name, q.name)}\n{q.unit}" for q in verdict.quantities)
+    title = "Best design, and change against the reference"
+    return table(["scenario", *heads], rows, title=title, gap=1)
+
+
+def _change(figure: FigureView | None) -> tuple[str, str]:
+    from gaitswarm.services.optimizer.analysis.verdict import percentage
+
+    if figure is None:
+        return MISSING, ""
+    style = {"better": "green", "worse": "red"}.get(figure.judgement, "")
+    change = f"{'-' if figure.change < 0.0 else '+'}{percentage(figure.change)}"
+    return f"{number(figure.value, 3)} {change}".replace(" ", "\xa0"), style
 
 
 def lineage_line(lineage: Lineage) -> str:

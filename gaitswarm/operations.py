@@ -38,11 +38,6 @@ from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView, convergence
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView, encoded_particles
 from gaitswarm.services.optimizer.analysis.distribution import distribution as spread
-from gaitswarm.services.optimizer.analysis.reference import (
-    JobReferenceView,
-    ReferenceView,
-    with_reference,
-)
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
 from gaitswarm.services.optimizer.analysis.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
@@ -140,27 +135,6 @@ class ServedJobs(DatabaseJobs):
         job = self._service.job(job_id)
         columns = self._service.columns(job).after(after_iteration)
         return encoded_particles(job, columns, most=max_points, objectives=objectives)
-
-    @analysis(
-        "GET /jobs/{job_id}/reference",
-        "get_reference",
-        "Compare a job's best with the published or the start design",
-        page=True,
-    )
-    def reference(self, job_id: str) -> JobReferenceView:
-        """Compare the best design so far with a reference in the job's scenarios: the published
-        design of its controller and preference, or for custom robots the middle of the bounds.
-
-        The reference is simulated once and stored with the job; job lists include it from then on.
-        """
-        job, reason = with_reference(self._service.store, self._service.job(job_id))
-        return JobReferenceView(
-            id=job.id,
-            reference=ReferenceView.from_reference(job.reference),
-            best_fitness=job.progress.best_fitness,
-            gain=job.gain,
-            reason=reason,
-        )
 
     @analysis(
         "GET /job-convergences", "list_convergences", "Get short convergences of jobs", page=True

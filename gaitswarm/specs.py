@@ -87,6 +87,7 @@ class ForkOptions(TypedDict, total=False):
     particles: int
     scenarios: ScenarioInput | Iterable[ScenarioInput]
     robot: RobotInput
+    bounds: Mapping[str, tuple[float, float]]
     iterations: int
     start_count: int
     accept_changes: bool

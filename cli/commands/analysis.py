@@ -232,6 +232,15 @@ def _importance_lines(view: ImportanceView) -> Iterator[str]:
         )
 
 
+def verdict(job_id: JobId, *, jobs: Jobs) -> Printed:
+    """Compare a job's best design with the published or the start design, by scenario."""
+    from gaitswarm.cli.tables import verdict_lines, verdict_table
+
+    view = jobs.verdict(job_id)
+    tables = [verdict_table(view)] if view.quantities else []
+    return view, [*tables, *verdict_lines(view, jobs.place)]
+
+
 def failures(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Show why designs of a job failed, by scenario, without simulation."""
     view = jobs.failures(job_id)

@@ -21,6 +21,7 @@ from gaitswarm.cli.options import (
     RobotOption,
     WorkerOptions,
     full_id,
+    name_and_bounds,
     name_and_value,
 )
 from gaitswarm.cli.output import Parts, Printed, note
@@ -252,10 +253,7 @@ def _range(entry: str) -> tuple[str, dict[str, str]]:
     """Return name and variable of NAME=LOW:HIGH."""
     from gaitswarm.sim.worlds import PERTURBATIONS
 
-    name, value = name_and_value(entry, "range", "NAME=LOW:HIGH")
-    low, colon, high = value.partition(":")
-    if not colon:
-        raise InvalidRequest(f"{entry!r} is not NAME=LOW:HIGH", field="range")
+    name, (low, high) = name_and_bounds(entry, "range")
     kinds = {variable.name: variable.kind for variable in PERTURBATIONS}
     kind = kinds.get(name, "continuous")
     return name, {"name": name, "low": low, "high": high, "kind": kind}

@@ -21,6 +21,7 @@ from gaitswarm.cli.options import (
     RobotOption,
     SpecOptions,
     completed,
+    name_and_bounds,
     one_of,
 )
 from gaitswarm.cli.output import Parts, Printed, note, print_table, print_text, write_json_items
@@ -243,11 +244,13 @@ def best(job_id: JobId, *, jobs: Jobs) -> Printed:
     view = jobs.best(job_id)
 
     def parts() -> Parts:
-        from gaitswarm.cli.tables import best_parts, place, worth
+        from gaitswarm.cli.tables import best_parts, place, verdict_lines, worth
 
         job = jobs.job(job_id)
         yield f"job {job_id}: fitness {worth(view, digits=6)}, design {place(view)}"
         yield from best_parts(view, job)
+        if job.kind == "tuning":
+            yield from verdict_lines(jobs.verdict(job_id), jobs.place)
 
     return view, parts()
 
@@ -305,6 +308,12 @@ def fork(
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
     ] = None,
     robot: RobotOption = None,
+    bounds: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH", help="Search this variable within other bounds; repeatable."
+        ),
+    ] = None,
     iterations: Annotated[
         int | None,
         typer.Option(help="Total budget, including copied iterations."),
@@ -341,6 +350,7 @@ def fork(
         "particles": particles,
         "scenarios": None if scenarios is None else scenario_data(scenarios, robot),
         "robot": None if robot is None else chosen_robot(robot),
+        "bounds": dict(name_and_bounds(entry, "bounds") for entry in bounds or ()) or None,
         "iterations": iterations,
         "start_count": start_count,
         "name": name,

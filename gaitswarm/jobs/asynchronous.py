@@ -85,6 +85,7 @@ class AsyncJobs:
     release = _awaited(Jobs.release)
     delete = _awaited(Jobs.delete)
     best = _awaited(Jobs.best)
+    verdict = _awaited(Jobs.verdict)
     iterations = _iterated(Jobs.iterations)
     history = _iterated(Jobs.history)
     evaluations = _awaited(Jobs.evaluations)

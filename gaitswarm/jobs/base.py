@@ -74,12 +74,14 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
+from gaitswarm.services.optimizer.analysis.reference import with_reference
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.analysis.utilities import (
     objective_vectors,
     require_success,
     tuning_spec,
 )
+from gaitswarm.services.optimizer.analysis.verdict import VerdictView, verdict
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
@@ -608,6 +610,18 @@ class Jobs(ABC):
                 " see why designs fail by its failures"
             )
         return BestView.from_evaluation(best, job.spec)
+
+    @analysis("GET /jobs/{job_id}/verdict", "get_verdict", "Judge the best design in words")
+    def verdict(self, job_id: str) -> VerdictView:
+        """Compare the best design of a tuning job so far with its reference in each scenario, and
+        name variables at a bound.
+
+        The reference is the published design of the job's controller and preference, or without one
+        the middle of the bounds. It is simulated once and stored with the job; job lists include it
+        from then on.
+        """
+        job, reason = with_reference(self._service.store, self._service.job(job_id))
+        return verdict(job, self._service.store.best(job_id), reason)
 
     @items
     @core("GET /jobs/{job_id}/iterations", "list_iterations", "List committed iterations")

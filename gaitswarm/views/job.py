@@ -196,7 +196,7 @@ class JobSummaryView(View):
     reference: ReferenceView | None = Field(
         default=None,
         description="Published design of its controller and preference in the same walks; null"
-        " without one, and until the job has ended or `/v1/jobs/{job_id}/reference` was requested.",
+        " without one, and until the job has ended or `/v1/jobs/{job_id}/verdict` was requested.",
     )
     gain: Finite = Field(
         default=None,

@@ -96,19 +96,22 @@ def _ask(job: Job, index: int) -> Ask:
 
 
 def _completed(job: Job, index: int, *, failed: bool) -> CompletedIteration:
-    """The first particle falls in the second scenario; the others are the better, the later."""
+    """The first particle falls in the last scenario; the others are the better, the later."""
     number = np.arange(PARTICLES, dtype=np.float64)
     objectives = np.full((PARTICLES, N_OBJECTIVES), 10.0) + number[:, None]
     statuses = np.full(PARTICLES, Status.FELL if failed else Status.OK, dtype=np.uint8)
-    second = statuses.copy()
-    second[0] = Status.FELL
+    last = statuses.copy()
+    last[0] = Status.FELL
     undefined = objectives.copy()
     undefined[0] = np.nan
-    fitness = np.where(second == Status.OK, 100.0 - index + np.arange(PARTICLES), np.inf)
+    fitness = np.where(last == Status.OK, 100.0 - index + np.arange(PARTICLES), np.inf)
     return CompletedIteration(
         iteration=index,
         designs=job.spec.design_space().designs(_ask(job, index).positions),
-        outcomes=(Outcome(objectives, statuses), Outcome(undefined, second)),
+        outcomes=(
+            *[Outcome(objectives, statuses)] * (len(job.spec.case_names) - 1),
+            Outcome(undefined, last),
+        ),
         fitness=fitness,
         evaluate_seconds=0.5,
     )

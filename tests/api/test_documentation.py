@@ -77,7 +77,7 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/job-facets",
         "get /v1/job-convergences",
         "get /v1/jobs/{job_id}/comparison",
-        "get /v1/jobs/{job_id}/reference",
+        "get /v1/jobs/{job_id}/verdict",
         "get /v1/jobs/{job_id}/activity",
         "get /v1/jobs/{job_id}/importance",
         "get /v1/robots",

@@ -1,4 +1,4 @@
-"""A job's best compared with the published design: computed once, then listed and sorted by."""
+"""A job's best compared with its reference: computed once, then listed and sorted by."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
 ) -> None:
     spec = tuning(preference="B")
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
-    here = f"/v1/jobs/{job.id}/reference"
+    here = f"/v1/jobs/{job.id}/verdict"
     early = client.get(here).json()
     assert early["reference"] is None and "no design has succeeded" in early["reason"]
     assert store.job(job.id).reference is None
@@ -56,6 +56,12 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
     }
     assert found["gain"] == 1.0 - found["best_fitness"] / walk["fitness"]
     assert found["reason"] is None
+    energies = [view["scenarios"]["brief"] for view in found["quantities"] if view["unit"] == "J/m"]
+    assert [energy["reference"] for energy in energies] == [
+        pytest.approx(walk["scenarios"]["brief"]["objectives"]["energy"])
+    ]
+    assert len(found["quantities"]) == sum(found["figures"].values()) == 5
+    assert found["sentences"][0].startswith("Compared with published B, ")
 
     monkeypatch.setattr(references, "walked_reference", None)
     assert client.get(here).json() == found
@@ -71,7 +77,7 @@ def test_a_robot_of_ones_own_is_measured_against_the_middle_of_the_bounds(
     spec = tuning(controller="pi", robot=robot, scenarios=[walk], variables=bounds)
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
     commit(job, 1)
-    found = client.get(f"/v1/jobs/{job.id}/reference").json()
+    found = client.get(f"/v1/jobs/{job.id}/verdict").json()
     integral = next(v for v in spec.design_space().variables if v.name == "I")
     asked = {
         "controller": "pi", "robot": robot, "scenarios": [walk],
@@ -97,7 +103,9 @@ def test_a_reference_that_is_stored_stays(store: Store, commit: Commit) -> None:
     commit(job, 1)
     store.note_reference(job.id, Reference(None, None))
     assert note_reference(store, store.job(job.id)).reference == Reference(None, None)
-    assert store.job(job.id).gain is None
+    ended, reason = with_reference(store, store.job(job.id))
+    assert ended.gain is None
+    assert reason == "a plug-in evaluates its designs, and none is a reference"
 
 
 def test_a_reference_that_an_outage_hinders_is_a_line_of_the_log_and_found_later(
@@ -121,34 +129,26 @@ def test_a_start_that_does_not_walk_says_so(store: Store, commit: Commit) -> Non
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
     commit(job, 1)
     found, reason = with_reference(store, store.job(job.id))
-    assert found.reference == Reference("start design", None, "start")
+    assert found.reference is not None
+    assert (found.reference.name, found.reference.fitness) == ("start design", None)
     assert reason == "the start design fails in one of the scenarios"
 
 
-@pytest.mark.parametrize(
-    ("changes", "digest", "reason"),
-    [
-        ({"controller": "pid"}, None, "no design was published"),
-        ({}, 32 * "0", "other code"),
-    ],
-)
-def test_reason_for_a_missing_reference(
-    client: httpx2.Client,
-    store: Store,
-    commit: Commit,
-    changes: dict[str, object],
-    digest: str | None,
-    reason: str,
+def test_a_job_of_other_code_has_no_reference_and_says_why(
+    client: httpx2.Client, store: Store, commit: Commit
 ) -> None:
-    spec = tuning(**changes)
-    provenance = job_provenance(spec)
-    if digest is not None:
-        provenance = provenance.model_copy(update={"optimizer_digest": digest})
-    job, _ = store.create_job(spec, provenance=provenance)
+    spec = tuning()
+    other = job_provenance(spec).model_copy(update={"optimizer_digest": 32 * "0"})
+    job, _ = store.create_job(spec, provenance=other)
     commit(job, 1)
-    found = client.get(f"/v1/jobs/{job.id}/reference").json()
-    assert (found["reference"], found["gain"]) == (None, None)
-    assert reason in found["reason"]
+    found = client.get(f"/v1/jobs/{job.id}/verdict").json()
+    assert (found["reference"], found["gain"], found["quantities"]) == (None, None, [])
+    assert "other code" in found["reason"]
+
+
+def test_without_a_published_design_the_reference_is_the_middle_of_the_bounds() -> None:
+    reference = walked_reference(tuning(controller="pid"))
+    assert (reference.name, reference.kind) == ("start design", "start")
 
 
 def test_jobs_are_sorted_by_gain_in_pages_either_way(store: Store, commit: Commit) -> None:
@@ -186,4 +186,6 @@ def test_in_many_worlds_the_reference_walks_in_them_too() -> None:
     nominal = walked_reference(tuning())
     assert many.fitness is not None and nominal.fitness is not None
     assert many.fitness != nominal.fitness
-    assert replace(many, fitness=0.0) == replace(nominal, fitness=0.0) == Reference("A", 0.0)
+    for reference, cases in ((many, 2), (nominal, 1)):
+        assert replace(reference, fitness=0.0, results=b"") == Reference("A", 0.0)
+        assert reference.objectives(cases).shape == (cases, 6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -50,6 +51,39 @@ def test_a_fork_states_why_it_starts_a_new_search(
     assert (lineage["carried"], lineage["changed"]) == ("designs", ["optimizer", "preference"])
     assert "another search method" in lineage["reason"]
     assert len(made.json["spec"]["start"]) == 1
+
+
+def test_the_command_of_a_verdict_forks_a_job_within_wider_bounds(
+    gaitswarm: Gaitswarm, db: Path, place: Place
+) -> None:
+    started = {"I": 0.1, "FI1R": 6000, "FI2R": 12000, "FOR": 2000, "FOMF": 3}
+    started |= {"FW1": 0.3, "FW23": 0.3, "FW4": 1.0, "FW56": 0.1}
+    start = db.with_suffix(".csv")
+    start.write_text(f"{','.join(started)}\n{','.join(map(str, started.values()))}\n", "utf-8")
+    budget = "--optimizer random --particles 1 --iterations 1 --scenarios 1 --evaluator in-process"
+    made = gaitswarm(
+        "optimize", *budget.split(), "--start-from", start, "--db", db, "--json"
+    )  # fmt: skip
+    verdict = made.json["verdict"]
+    assert [bound["name"] for bound in verdict["bounds"]] == [
+        "I",
+        "FI1R",
+        "FOR",
+        "FOMF",
+        "FW4",
+        "FW56",
+    ]
+
+    program, *command = shlex.split(verdict["widen"])
+    assert program == "gaitswarm"
+    fork = gaitswarm(*command, *place(db), "--json")
+    assert fork.code == 0, fork.err
+    bounds = {v["name"]: (v["low"], v["high"]) for v in fork.json["spec"]["variables"]}
+    assert (bounds["FI1R"], bounds["I"]) == ((1500.0, 8250.0), (0.01, 1.0))
+    assert fork.json["spec"]["start"] == [made.json["best"]["design"]]
+
+    refused = gaitswarm(*command[:4], "--bounds", "FI1R=1500", *place(db))
+    assert "bounds: 'FI1R=1500' is not NAME=LOW:HIGH" in refused.err
 
 
 def test_a_fork_from_a_missing_iteration_is_bad_input(

@@ -67,6 +67,7 @@ COMMANDS = {
     "robustness": "ID --samples 45 --json",
     "simulate": "--design job:ID --json",
     "status": "ID --json",
+    "verdict": "ID --json",
     "submit": "--start-from ID,ID --json",
     "targets": "ID",
     "validate": "MEASURED --design job:ID --scenario 1 --cycles 2 --json",

@@ -15,6 +15,7 @@ COMMANDS = [
     "list",
     "status ID",
     "best ID",
+    "verdict ID",
     "history ID",
     "importance ID",
     "front ID",

@@ -271,6 +271,21 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
     assert other is not None and "in double" in other.reason
 
 
+def test_a_fork_within_other_bounds_searches_there_from_the_best_designs(store: Store) -> None:
+    job = parent(store)
+    forked = fork(store, job, 3, bounds={"P": [0.01, 3.0]}, preference=SPEED)
+    before, after = ({v.name: v for v in j.spec.design_space().variables} for j in (job, forked))
+    assert (after["P"].low, after["P"].high) == (0.01, 3.0)
+    assert after["I"] == before["I"]
+    assert forked.lineage is not None
+    assert forked.lineage.reason == "the parent searched within other bounds"
+    # Bounds alter no results, so the best are those by the new preference.
+    columns = service(store).columns(job)
+    judged = forked.spec.judge(columns.objectives, columns.failed).fitness[: 3 * PARTICLES]
+    shown = job.spec.design_space().shown(columns.designs[judged.argmin()].tolist())
+    assert forked.spec.start[0] == shown  # type: ignore[index]
+
+
 @pytest.mark.variants("given0-*", "given4-*")
 @pytest.mark.parametrize(
     ("given", "field"),
@@ -280,6 +295,9 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
         ({"from_iteration": 3, "iterations": 3}, "iterations"),
         ({"from_iteration": 3, "preference": "B", "iterations": 2}, "iterations"),
         ({"from_iteration": 3, "scenarios": ["1", "normal-fast"]}, "scenarios"),
+        ({"from_iteration": 3, "bounds": {"Q": [0, 1]}}, "bounds: the job does not search 'Q'"),
+        ({"from_iteration": 3, "bounds": {"P": [1, 0]}}, "bounds.P"),
+        ({"from_iteration": 3, "bounds": {"P": [-1, 1]}}, "variables"),
     ],
 )
 def test_an_invalid_fork_is_refused_by_field_and_nothing_is_stored(

@@ -200,6 +200,14 @@ def test_a_jobs_headline_convergence_winner_and_walk(
     expect(walked).to_contain_text("designs")
     assert 0 < int(walked.get_attribute("data-dots") or 0) <= job["evaluations"]
 
+    verdict = server.client.get(f"/v1/jobs/{finished_job}/verdict").json()
+    card = page.get_by_role("region", name="Verdict")
+    for sentence in verdict["sentences"]:
+        expect(card).to_contain_text(sentence)
+    rows = card.get_by_role("table", name="Change against the reference").locator("tbody tr")
+    expect(rows).to_have_count(len(job["scenarios"]))
+    expect(rows.locator("[data-tone=better]")).to_have_count(verdict["figures"]["better"])
+
     winner = page.get_by_role("region", name="Winner")
     expect(winner.get_by_role("img")).to_have_count(len(job["best"]["design"]))
     winner.get_by_role("button", name=re.compile("^Show as table.*Winner")).click()

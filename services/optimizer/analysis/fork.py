@@ -5,7 +5,7 @@ only the budget          yes               continues                    the pare
 the preference           yes               continues, its memory        the parent's iterations,
                                            rejudged if supported        rejudged
 any other                no, except for    new                          the best designs, if
-                         the optimizer                                  designs are searched for
+                         optimizer, bounds                              designs are searched for
 
 If the search cannot be taken over under another preference, the fork starts from the best designs
 by that preference.
@@ -144,7 +144,7 @@ def _check(spec: Spec, designs: list[Design]) -> None:
         raise ValueError(f"{name} of its best design no. {int(number) + 1}: {problem}") from error
 
 
-_OUTCOMES_HOLD: Final = frozenset({"preference", "optimizer"})
+_OUTCOMES_HOLD: Final = frozenset({"preference", "optimizer", "variables"})
 """Fields of a spec that do not affect outcomes."""
 
 
@@ -255,6 +255,8 @@ def _reason_for_new_search(parent: AnySpec, changed: Sequence[str]) -> str:
     others = [name for name in changed if name not in _OUTCOMES_HOLD]
     if others:
         return f"results of the parent's designs do not hold for a different {' and '.join(others)}"
+    if "variables" in changed:
+        return "the parent searched within other bounds"
     if "optimizer" in changed:
         return "another search method or other settings cannot continue the parent's search"
     if "preference" in changed and parent.precision == "single":

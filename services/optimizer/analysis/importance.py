@@ -16,12 +16,18 @@ designs that were tried, correlated variables share their index, and indices do 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.bounds import (
+    End,
+    WidenedView,
+    bound_at,
+    wider_bounds,
+)
 from gaitswarm.services.optimizer.analysis.distribution import thinned
 from gaitswarm.services.optimizer.analysis.statistics import (
     CONFIDENCE,
@@ -29,7 +35,6 @@ from gaitswarm.services.optimizer.analysis.statistics import (
     resample_weights,
 )
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, objective_vectors
-from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -50,13 +55,6 @@ _MOST_CLASSES: Final = 24
 _RESAMPLE: Final = 0x1337
 
 
-NEAR: Final = 0.01
-"""Share of a variable's range within which a winner lies at the bound [1]."""
-
-_STEPS: Final = (0.5, 0.25, 0.1)
-"""Shares of the range by which a bound may move; the first that can be simulated is used."""
-
-
 class IndexIntervalView(View):
     """A first-order Sobol' index [1] with its interval."""
 
@@ -66,13 +64,6 @@ class IndexIntervalView(View):
     )
     low: float = Field(description="Lower end of the interval of 95 %.", examples=[0.35])
     high: float = Field(description="Upper end.", examples=[0.47])
-
-
-class WidenedView(View):
-    """Wider bounds for a variable whose best value lies at a bound."""
-
-    low: float = Field(description="Lower bound, in the variable's unit.", examples=[500.0])
-    high: float = Field(description="Upper bound.", examples=[14750.0])
 
 
 class VariableImportanceView(View):
@@ -107,7 +98,7 @@ class VariableImportanceView(View):
         " choice; null without one.",
         examples=[5950.0],
     )
-    at: Literal["low", "high"] | None = Field(
+    at: End | None = Field(
         description="Bound at which the winner lies, within a hundredth of the range."
     )
     widened: WidenedView | None = Field(
@@ -172,7 +163,7 @@ def _variables(
     moved = companions(designs, variables)
     for k, variable in enumerate(variables):
         value = None if winner is None else float(winner[k])
-        at = None if value is None else _bound_at(variable, value)
+        at = None if value is None else bound_at(variable, value)
         companion, correlation = moved[k] or (None, None)
         yield VariableImportanceView(
             name=variable.name,
@@ -186,53 +177,8 @@ def _variables(
             correlation=correlation,
             winner=value,
             at=at,
-            widened=None if at is None else _widened(spec, variable, at),
+            widened=None if at is None else wider_bounds(spec, variable, at),
         )
-
-
-def _bound_at(variable: Variable, value: float) -> Literal["low", "high"] | None:
-    # Every value of a categorical variable, or of one of two integers, is at an end.
-    span = variable.high - variable.low
-    if variable.kind == "categorical" or (variable.kind == "integer" and span < 2):
-        return None
-    if value <= variable.low + NEAR * span:
-        return "low"
-    return "high" if value >= variable.high - NEAR * span else None
-
-
-def _widened(spec: Spec, variable: Variable, at: Literal["low", "high"]) -> WidenedView | None:
-    """The widest bounds that can be simulated; None if none can."""
-    if not isinstance(spec, JobSpec):
-        return None
-    for low, high in _wider(variable, at):
-        wider = variable.model_copy(update={"low": low, "high": high})
-        chosen = [wider if v.name == variable.name else v for v in spec.design_space().variables]
-        try:
-            spec.model_copy(update={"variables": tuple(chosen)}).check_can_be_simulated()
-        except InvalidRequest:
-            continue
-        return WidenedView(low=low, high=high)
-    return None
-
-
-def _wider(variable: Variable, at: Literal["low", "high"]) -> Iterator[tuple[float, float]]:
-    low, high = variable.low, variable.high
-    for step in _STEPS:
-        further = step * (high - low)
-        if variable.kind == "integer":
-            further = max(1.0, round(further))
-        if at == "high":
-            yield low, _rounded(variable, high + further)
-        # Positive variables stay positive.
-        elif low <= 0.0 or low - further > 0.0:
-            yield _rounded(variable, low - further), high
-    if at == "low" and low > 0.0 and variable.kind != "integer":
-        yield _rounded(variable, 0.5 * low), high
-
-
-def _rounded(variable: Variable, bound: float) -> float:
-    """Round a bound to six digits."""
-    return bound if variable.kind == "integer" else float(f"{bound:.6g}")
 
 
 def first_order_indices(

@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.reference import (
     reference_design,
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.views import Finite, JobName, View
+from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.case import Walk, run_together
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.outcome import Status
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
 
 NONE: Final = Reference(None, None)
-"""For a job of a shipped robot without a published design."""
+"""For a job with a plug-in's case."""
 
 _JUDGED_BY: Final = frozenset(
     {"robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"}
@@ -51,7 +51,7 @@ class ReferenceView(View):
     )
     kind: ReferenceKind = Field(
         default="published",
-        description="`published`, or for a custom robot `start`: the middle of the job's bounds.",
+        description="`published`, or without one `start`: the middle of the job's bounds.",
     )
     fitness: Finite = Field(
         description="By the job's measure, in double precision [1]; null if it fails.",
@@ -64,19 +64,6 @@ class ReferenceView(View):
         if reference is None or reference.name is None:
             return None
         return cls.model_validate(reference)
-
-
-class JobReferenceView(View):
-    """A job's best design compared with its reference."""
-
-    id: JobName
-    reference: ReferenceView | None = Field(description="The published or the start design.")
-    best_fitness: Finite = Field(description="Least fitness of the job so far [1].")
-    gain: Finite = Field(
-        description="Relative improvement over the reference [1]; null if undefined.",
-        examples=[0.39],
-    )
-    reason: str | None = Field(description="Why there is no gain, in words; null if there is one.")
 
 
 def walked_reference(spec: Spec) -> Reference:
@@ -103,7 +90,8 @@ def _walked(judged_by: str) -> Reference:
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
     fitness = float(spec.judge(objectives, failed).fitness[0])
-    return Reference(name, fitness if math.isfinite(fitness) else None, kind)
+    results = objectives[0].astype("<f8").tobytes()
+    return Reference(name, fitness if math.isfinite(fitness) else None, kind, results)
 
 
 def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
@@ -131,7 +119,7 @@ def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
 def _why_none(job: Job) -> str:
     reference = job.reference or NONE
     if reference.name is None:
-        return "no design was published for this controller and robot"
+        return "a plug-in evaluates its designs, and none is a reference"
     if reference.fitness is None:
         description = START if reference.kind == "start" else f"published design {reference.name}"
         return f"the {description} fails in one of the scenarios"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
@@ -15,8 +16,10 @@ from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
 from gaitswarm.sim.input import Line
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import ScenarioChoice
+from gaitswarm.sim.variables import VariableName
 
 _SPEC_FIELDS: Final = ("name", "preference", "optimizer", "scenarios", "robot", "iterations")
 """Fields of a request that are also fields of a spec."""
@@ -57,6 +60,13 @@ class ForkRequest(BaseModel):
     )
     robot: RobotSource | None = Field(
         default=None, description="Robot to simulate; null: the parent's."
+    )
+    bounds: dict[VariableName, tuple[FiniteFloat, FiniteFloat]] = Field(
+        default_factory=dict,
+        max_length=128,
+        description="Lower and upper bounds of searched variables, by name, in their units; those"
+        " of the parent for all others.",
+        examples=[{"FI1R": [1500.0, 8250.0]}],
     )
     iterations: Annotated[int, Field(ge=1, le=1_000_000)] | None = Field(
         default=None,
@@ -148,6 +158,8 @@ def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
     """Return the spec of a fork, resolved."""
     changes = {name: getattr(request, name) for name in _SPEC_FIELDS}
     changes = {name: value for name, value in changes.items() if value is not None}
+    if request.bounds:
+        changes["variables"] = _within(parent, request.bounds)
     if request.particles is not None:
         settings = changes.get("optimizer", parent.optimizer)
         changes["optimizer"] = settings.model_dump() | {"particles": request.particles}
@@ -155,6 +167,22 @@ def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
         if name not in type(parent).model_fields:
             raise InvalidRequest(f"a job of kind {parent.kind} has no such field", field=name)
     return checked_spec(parent, changes).resolved()
+
+
+def _within(
+    parent: AnySpec, bounds: Mapping[str, tuple[float, float]]
+) -> tuple[dict[str, Any], ...]:
+    """Return the parent's variables within other bounds."""
+    variables = {variable.name: variable for variable in parent.design_space().variables}
+    for name, (low, high) in bounds.items():
+        if name not in variables:
+            text = f"the job does not search {name!r}; {instead_of(name, variables)}"
+            raise InvalidRequest(text, field="bounds")
+        if variables[name].kind == "categorical" or not low < high:
+            text = "is categorical" if low < high else f"{low:g} is not less than {high:g}"
+            raise InvalidRequest(text, field=f"bounds.{name}")
+        variables[name] = variables[name].model_copy(update={"low": low, "high": high})
+    return tuple(variable.model_dump() for variable in variables.values())
 
 
 def changed_fields(parent: AnySpec, fork: AnySpec) -> tuple[str, ...]:

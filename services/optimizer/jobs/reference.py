@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
@@ -29,6 +30,11 @@ class Reference:
     name: str | None
     fitness: float | None  # by the job's measure, in double precision; None if it fails in a case
     kind: ReferenceKind = "published"
+    results: bytes = b""  # (K, m) raw objectives, NaN where it fails, as little-endian float64
+
+    def objectives(self, cases: int) -> NDArray[np.float64]:
+        """Return the (K, m) raw objectives, columns as in the objectives of the job."""
+        return np.frombuffer(self.results, "<f8").reshape(cases, -1)
 
     def gain(self, fitness: float | None) -> float | None:
         """Return the relative improvement of a fitness over the reference."""
@@ -40,19 +46,17 @@ class Reference:
 def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
     """Return the design that a job's best is compared with.
 
-    Shipped robots have a published one, for the job's controller and preference; of custom robots
-    it is the start design, the middle of the bounds. Plug-in cases have other measures.
+    Shipped robots have a published one, for most controllers; otherwise it is the start design, the
+    middle of the bounds. Plug-in cases have other measures.
     """
     if not isinstance(spec, JobSpec) or spec.case is not None:
         return None
-    if isinstance(spec.robot, RobotFiles):
+    study = None if isinstance(spec.robot, RobotFiles) else published_study(spec)
+    if study is None:
         space = spec.design_space()
         middle = space.designs(np.array([(space.low + space.high) / 2.0]))
         (values,) = space.simulated(middle).tolist()
         return START, "start", dict(zip(space.names, values, strict=True))
-    study = published_study(spec)
-    if study is None:
-        return None
     published = CONTROLLERS[spec.controller].published[study]
     return study, "published", adapted_to_job(published, spec)
 

@@ -55,6 +55,9 @@ _SAME_NAME: Final = tuple(
 _PROGRESS: Final = tuple(field.name for field in fields(Progress))
 """Columns that are fields of `Progress`."""
 
+_REFERENCE: Final = tuple(field.name for field in fields(Reference))
+"""Columns `reference_...` that are fields of `Reference`."""
+
 COLUMNS: Final = tuple(
     cast(column, Text).label(column.name) if column.name in _DOCUMENTS else column
     for column in jobs.c
@@ -175,7 +178,7 @@ def to_job(row: Row) -> Job:
         labels=labels,
         reference=None
         if row["reference_kind"] is None
-        else Reference(row["reference_name"], row["reference_fitness"], row["reference_kind"]),
+        else Reference(**{name: row[f"reference_{name}"] for name in _REFERENCE}),
     )
 
 

@@ -120,6 +120,7 @@ jobs: Final = sa.Table(
     sa.Column("reference_name", sa.Text),
     sa.Column("reference_fitness", sa.Double),
     sa.Column("reference_kind", sa.Text),
+    sa.Column("reference_results", sa.LargeBinary),
     # What lists filter by. Of the spec: kind and names, see `labels.py`; of the labels: tags, each
     # between line ends.
     *(sa.Column(n, sa.Text) for n in ("kind", "robot", "controller", "preference", "tags")),

@@ -1,9 +1,12 @@
-/** Relative improvement of a job's best over the published or the start design. */
+/** Improvement of a job's best over the published or the start design, and the verdict on it. */
 
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
-import type { ReferenceView, StoredJob } from '../api/types'
+import type { ReferenceView, StoredJob, Verdict } from '../api/types'
 import type { ReferenceLine } from '../charts/lines/reference-line'
+
+/** Time without a better design before a running job is judged [ms]. */
+const PAUSE = 1000
 
 export interface Gain {
   /** Null if unknown or if there is none. */
@@ -13,15 +16,19 @@ export interface Gain {
   readonly reason: string | null
 }
 
-/** Use the reference stored with the job; otherwise request it, which simulates one design. */
-export function useGain(job: StoredJob | null): Gain {
-  const stored = job?.reference ?? null
-  const pending = stored === null && job?.kind === 'tuning' && job.best_fitness !== null
-  const response = useResource(pending ? `reference ${job.id}` : null, (signal) =>
-    get('/v1/jobs/{job_id}/reference', { path: { job_id: job!.id }, signal }),
+/** Request the verdict, which simulates the reference if it is not stored with the job. */
+export function useGain(job: StoredJob | null): Gain & { readonly verdict: Verdict | null } {
+  const best = job?.kind === 'tuning' ? job.best_fitness : null
+  const { data } = useResource(
+    best === null ? null : `verdict ${job!.id} ${best}`,
+    (signal) => get('/v1/jobs/{job_id}/verdict', { path: { job_id: job!.id }, signal }),
+    { keep: true, pause: job?.finished_at ? 0 : PAUSE },
   )
-  const reference = stored ?? response.data?.reference ?? null
-  return gainOf(reference, job?.best_fitness ?? null, response.data?.reason ?? null)
+  const reference = job?.reference ?? data?.reference ?? null
+  return {
+    ...gainOf(reference, job?.best_fitness ?? null, data?.reason ?? null),
+    verdict: data,
+  }
 }
 
 export function gainOf(

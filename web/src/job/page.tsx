@@ -11,7 +11,7 @@ import { usePlace } from '../router/navigation'
 import { jobPath, withQuery } from '../router/routes'
 import { SHARED } from './designs/particles'
 import { caseWords, progressInWords } from './facts'
-import { type Gain, useGain } from './gain'
+import { useGain } from './gain'
 import { JobHeader } from './header/header'
 import { type LiveJob, useJob } from './live/use-job'
 import { OverviewPanel } from './overview/panel'
@@ -20,7 +20,7 @@ import './job.css'
 export interface PanelProps {
   readonly live: LiveJob
   readonly job: Job
-  readonly gain: Gain
+  readonly gain: ReturnType<typeof useGain>
   /** Part of the path after the tab; undefined for none. */
   readonly detail: string | undefined
 }

@@ -20,9 +20,10 @@ import { ConvergenceChart } from './convergence-chart'
 import { DistributionChart } from './distribution-chart'
 import { type WinnerVariable, winnerVariables } from './model'
 import { useDistribution } from './use-distribution'
+import { VerdictCard } from './verdict-card'
 import './overview.css'
 
-export function OverviewPanel({ live, job, gain: { reference } }: PanelProps) {
+export function OverviewPanel({ live, job, gain: { reference, verdict } }: PanelProps) {
   const { iterations } = live.followed
   const distribution = useDistribution(job.id, iterations.length)
   if (iterations.length === 0) {
@@ -48,6 +49,7 @@ export function OverviewPanel({ live, job, gain: { reference } }: PanelProps) {
         distribution={distribution}
         reference={reference}
       />
+      {verdict !== null && verdict.sentences.length > 0 && <VerdictCard verdict={verdict} />}
       <div class="grid">
         <DistributionChart job={job} iterations={iterations} distribution={distribution} />
         <IterationChart

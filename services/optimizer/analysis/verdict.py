@@ -1,0 +1,313 @@
+"""Verdict on a job's best design, in words: gains and losses against its reference, and bounds"""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaitswarm.services.optimizer.analysis.bounds import End, bound_at, with_wider_bounds
+from gaitswarm.services.optimizer.analysis.reference import ReferenceView
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.views import Finite, JobName, View
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
+
+Floats = NDArray[np.float64]
+
+Judgement = Literal["better", "same", "worse"]
+
+SAME: Final = 0.005
+"""Relative difference up to which two values are the same [1]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A quantity in users' units, with the words for its change."""
+
+    name: str
+    unit: str
+    objective: str  # objective that measures it
+    better: str  # word after a percentage
+    worse: str
+    reciprocal: bool = False  # of the objective
+
+
+QUANTITIES: Final = (
+    Quantity("speed", "m/s", "reciprocal_speed", "faster", "slower", reciprocal=True),
+    Quantity("energy", "J/m", "energy", "less energy per metre", "more energy per metre"),
+    Quantity("acceleration", "m/s2", "acceleration", "less acceleration", "more acceleration"),
+    Quantity(
+        "angular_acceleration",
+        "rad/s2",
+        "angular_acceleration",
+        "less angular acceleration",
+        "more angular acceleration",
+    ),
+    Quantity("torque", "N m", "torque", "less torque", "more torque"),
+)
+"""Quantities that are compared. The loss of height, a difference near zero, has no ratio."""
+
+
+class FigureView(View):
+    """A quantity of the best design in one scenario."""
+
+    value: float = Field(
+        description="Of the best design, in the quantity's unit; the geometric mean over worlds.",
+        examples=[0.0463],
+    )
+    reference: float = Field(description="Of the reference.", examples=[0.0417])
+    change: float = Field(description="`value` / `reference` - 1 [1].", examples=[0.11])
+    judgement: Judgement = Field(
+        description="Whether that is better, worse, or by at most 0.5 % the same."
+    )
+
+
+class QuantityView(View):
+    """A quantity of the best design in all scenarios in which the reference walks."""
+
+    name: str = Field(description="Name of the quantity.", examples=["speed"])
+    unit: str = Field(description="Its unit.", examples=["m/s"])
+    change: float = Field(
+        description="Relative change of the geometric mean over scenarios [1].", examples=[0.11]
+    )
+    judgement: Judgement = Field(description="As of a figure.")
+    scenarios: dict[str, FigureView] = Field(description="Figures by scenario.")
+
+
+class BoundView(View):
+    """A variable whose best value lies at a bound of the search."""
+
+    name: str = Field(description="Name of the variable.", examples=["FI1R"])
+    unit: str = Field(description="Its unit.", examples=["counts"])
+    value: float = Field(description="Value in the best design.", examples=[5990.0])
+    at: End = Field(description="Bound at which it lies, within a hundredth of the range.")
+    bound: float = Field(description="That bound.", examples=[6000.0])
+
+
+class VerdictView(View):
+    """A job's best design compared with its reference, in words and numbers."""
+
+    id: JobName
+    reference: ReferenceView | None = Field(description="The published or the start design.")
+    best_fitness: Finite = Field(description="Least fitness of the job so far [1].")
+    gain: Finite = Field(
+        description="Relative improvement over the reference [1]; null if undefined.",
+        examples=[0.39],
+    )
+    reason: str | None = Field(description="Why there is no gain, in words; null if there is one.")
+    sentences: list[str] = Field(
+        description="Verdict in words.",
+        examples=[["Compared with published A, 20 % better by fitness: 11 % faster."]],
+    )
+    quantities: list[QuantityView] = Field(description="Compared quantities; empty without any.")
+    figures: dict[Judgement, int] = Field(
+        description="Number of figures (quantities in scenarios) by judgement.",
+        examples=[{"better": 22, "same": 1, "worse": 7}],
+    )
+    bounds: list[BoundView] = Field(description="Variables at a bound of the search.")
+    widen: str | None = Field(
+        description="Command that starts another search from the best designs within wider bounds;"
+        " null if no wider bounds can be simulated.",
+        examples=["gaitswarm fork k2q7zr5dm9xw --from 25 --bounds FI1R=1500:8250"],
+    )
+
+
+def verdict(job: Job, best: Evaluation | None, reason: str | None) -> VerdictView:
+    """Judge the best design of a job.
+
+    Args:
+        job: With its reference, if that is known.
+        best: Its best design, if there is one.
+        reason: Why there is no gain, if there is none.
+    """
+    reference, spec = job.reference, job.stored_spec
+    quantities: list[QuantityView] = []
+    sentences: list[str] = []
+    bounds: list[BoundView] = []
+    widen = None
+    if best is not None and isinstance(spec, JobSpec):
+        if reference is not None:
+            quantities = compared(spec, (best.reevaluation or best).objectives, reference)
+            sentences += comparison_in_words(quantities, reference, job.gain)
+        bounds, widened = bounds_reached(spec, best.design)
+        sentences += bounds_in_words(bounds, len(spec.design_space().variables))
+        if widened:
+            options = (("--bounds", f"{name}={ends}") for name, ends in widened.items())
+            call = ("fork", job.id, "--from", str(job.progress.iterations))
+            widen = shlex.join(("gaitswarm", *call, *(word for pair in options for word in pair)))
+    counts = Counter(f.judgement for q in quantities for f in q.scenarios.values())
+    return VerdictView(
+        id=job.id,
+        reference=ReferenceView.from_reference(reference),
+        best_fitness=job.progress.best_fitness,
+        gain=job.gain,
+        reason=reason,
+        sentences=sentences,
+        quantities=quantities,
+        figures={judgement: counts[judgement] for judgement in ("better", "same", "worse")},
+        bounds=bounds,
+        widen=widen,
+    )
+
+
+def compared(spec: JobSpec, objectives: Floats, reference: Reference) -> list[QuantityView]:
+    """Compare raw objectives (K, m) with those of the reference, in scenarios where both walk."""
+    if not reference.results:
+        return []
+    names = [scenario.name for scenario in spec.resolved_scenarios()]
+    both = np.stack([objectives, reference.objectives(len(objectives))])
+    walked = np.isfinite(both[:, :, : len(OBJECTIVE_NAMES)]).all(axis=(0, 2))
+    worlds = len(objectives) // len(names)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = np.log(both)
+    views = []
+    for quantity in QUANTITIES:
+        column = logarithms[:, :, OBJECTIVE_NAMES.index(quantity.objective)]
+        usable = (walked & np.isfinite(column).all(axis=0)).reshape(-1, worlds)
+        by_scenario = column.reshape(2, -1, worlds)
+        means = {
+            name: by_scenario[:, k, usable[k]].mean(axis=1).tolist()
+            for k, name in enumerate(names)
+            if usable[k].any()
+        }
+        if means:
+            views.append(_quantity(quantity, means))
+    return views
+
+
+def _quantity(quantity: Quantity, means: Mapping[str, Sequence[float]]) -> QuantityView:
+    """means: logarithms of the objective, of the best design and of the reference, by scenario."""
+    sign = -1.0 if quantity.reciprocal else 1.0
+    figures = {
+        name: FigureView(
+            value=np.exp(sign * best),
+            reference=np.exp(sign * other),
+            change=np.expm1(sign * (best - other)),
+            judgement=_judged(best - other),
+        )
+        for name, (best, other) in means.items()
+    }
+    mean = float(np.mean([best - other for best, other in means.values()]))
+    return QuantityView(
+        name=quantity.name,
+        unit=quantity.unit,
+        change=np.expm1(sign * mean),
+        judgement=_judged(mean),
+        scenarios=figures,
+    )
+
+
+def _judged(logarithm: float) -> Judgement:
+    """logarithm: of the ratio of two minimized values."""
+    ratio = float(np.exp(logarithm))
+    if abs(ratio - 1.0) <= SAME:
+        return "same"
+    return "better" if ratio < 1.0 else "worse"
+
+
+def comparison_in_words(
+    views: Sequence[QuantityView], reference: Reference, gain: float | None
+) -> Iterator[str]:
+    """Yield sentences on the changes overall, on scenarios that got worse, and on the figures."""
+    if not views:
+        return
+    words = {quantity.name: quantity for quantity in QUANTITIES}
+    changes: dict[Judgement, list[str]] = {"better": [], "same": [], "worse": []}
+    for view in views:
+        change, quantity = percentage(view.change), words[view.name]
+        texts = {
+            "better": f"{change} {quantity.better}",
+            "same": f"the same {view.name.replace('_', ' ')}",
+            "worse": f"{change} {quantity.worse}",
+        }
+        changes[view.judgement].append(texts[view.judgement])
+    kind = "published " if reference.kind == "published" else "the "
+    against = f"Compared with {kind}{reference.name}"
+    if gain is not None:
+        fitness = _judged(np.log1p(-gain))
+        same = fitness == "same"
+        against += f", {'of the same' if same else f'{percentage(gain)} {fitness} by'} fitness"
+    gained = listed(changes["better"] + changes["same"])
+    paid = listed(changes["worse"])
+    yield f"{against}: {', but '.join(filter(None, (gained, paid)))}."
+    for view in views:
+        yield from _losses(view, words[view.name])
+    figures = [figure.judgement for view in views for figure in view.scenarios.values()]
+    yield _counted(Counter(figures), len(figures))
+
+
+def _losses(view: QuantityView, quantity: Quantity) -> Iterator[str]:
+    """Yield a sentence on the scenarios in which a quantity is worse than the reference's."""
+    losses = {name: f for name, f in view.scenarios.items() if f.judgement == "worse"}
+    if not losses:
+        return
+    most = max(losses, key=lambda name: abs(np.log1p(losses[name].change)))
+    where = f"in {len(losses)} of {len(view.scenarios)} scenarios, most "
+    if len(losses) == len(view.scenarios):
+        where = "in every scenario, most " if len(losses) > 1 else ""
+    elif len(losses) == 1:
+        where = ""
+    yield (
+        f"{quantity.worse.capitalize()} {where}in {most}: {losses[most].value:.3g} instead of"
+        f" {losses[most].reference:.3g} {view.unit}."
+    )
+
+
+def _counted(counts: Mapping[Judgement, int], total: int) -> str:
+    if counts.get("better") == total:
+        return f"Better in all {total} figures."
+    texts: dict[Judgement, str] = {"better": "better", "same": "the same", "worse": "worse"}
+    parts = [f"{text} in {counts[name]}" for name, text in texts.items() if counts.get(name)]
+    return f"{listed(parts).capitalize()} of {total} figures."
+
+
+def bounds_reached(spec: JobSpec, design: Floats) -> tuple[list[BoundView], dict[str, str]]:
+    """Return variables of a design at a bound, and as LOW:HIGH the bounds that can be widened.
+
+    All of these bounds can be simulated together.
+    """
+    reached, widened, wider = [], {}, spec
+    for variable, value in zip(spec.design_space().variables, design.tolist(), strict=False):
+        at = bound_at(variable, value)
+        if at is None:
+            continue
+        bound = variable.low if at == "low" else variable.high
+        fields = {"name": variable.name, "unit": variable.unit, "value": value}
+        reached.append(BoundView(**fields, at=at, bound=bound))
+        following = with_wider_bounds(wider, variable, at)
+        if following is not None:
+            wider = following
+            (found,) = (v for v in wider.design_space().variables if v.name == variable.name)
+            widened[variable.name] = f"{found.low:.6g}:{found.high:.6g}"
+    return reached, widened
+
+
+def bounds_in_words(bounds: Sequence[BoundView], variables: int) -> Iterator[str]:
+    """Yield a sentence on the variables at a bound."""
+    if bounds:
+        values = [
+            f"{bound.name} at {bound.bound:g}{'' if bound.unit == '1' else f' {bound.unit}'}"
+            for bound in bounds
+        ]
+        number = f"{len(bounds)} of {variables} variables"
+        yield f"At a bound of the search: {number}, {listed(values)}."
+
+
+def percentage(change: float) -> str:
+    """Format the size of a relative change with two digits, such as 0.62 % or 240 %."""
+    percent = 100.0 * abs(change)
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
+
+
+def listed(texts: Sequence[str]) -> str:
+    """Return texts as an enumeration: `a, b and c`."""
+    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))

@@ -1,0 +1,155 @@
+"""The verdict on a best design: its words say what its numbers say."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gaitswarm.services.optimizer.analysis.verdict import (
+    QUANTITIES,
+    QuantityView,
+    bounds_in_words,
+    bounds_reached,
+    compared,
+    comparison_in_words,
+    percentage,
+)
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
+
+SCENARIOS = ("normal-fast", "slope-fast", "loaded-slow")
+PUBLISHED = np.array([[9.0, 1.2, 12.0, 70.0, 20.0, 0.004]]).repeat(len(SCENARIOS), axis=0)
+"""Raw objectives of a reference in every scenario."""
+
+
+def tuning(**changes: object) -> JobSpec:
+    return JobSpec.model_validate({"scenarios": SCENARIOS, **changes})
+
+
+def reference(objectives: np.ndarray = PUBLISHED) -> Reference:
+    return Reference("A", 20.0, "published", objectives.astype("<f8").tobytes())
+
+
+def views(ratios: np.ndarray, spec: JobSpec | None = None) -> list[QuantityView]:
+    """Compare a design whose objectives f1 to f5 (K, 5) are these multiples of the reference's."""
+    objectives = PUBLISHED.copy()
+    objectives[:, :5] *= ratios
+    return compared(spec or tuning(), objectives, reference())
+
+
+def words(ratios: np.ndarray, gain: float | None = 0.2) -> list[str]:
+    return list(comparison_in_words(views(ratios), reference(), gain))
+
+
+def test_a_design_that_is_better_everywhere() -> None:
+    ratios = np.tile([1.0, 0.52, 0.6, 0.61, 1 / 1.11], (3, 1))
+    ratios[:, 0] = 0.9
+    overall, counted = words(ratios)
+    assert overall == (
+        "Compared with published A, 20 % better by fitness: 11 % faster, 39 % less energy per"
+        " metre, 48 % less acceleration, 40 % less angular acceleration and 10 % less torque."
+    )
+    assert counted == "Better in all 15 figures."
+
+
+def test_a_fitness_that_is_paid_with_speed_says_so() -> None:
+    ratios = np.tile([0.8, 1.001, 0.9, 0.7, 1.25], (3, 1))
+    ratios[1, 3], ratios[1, 4] = 1.1, 2.0
+    overall, *rest = words(ratios)
+    assert overall == (
+        "Compared with published A, 20 % better by fitness: 19 % less energy per metre, 10 % less"
+        " angular acceleration, 20 % less torque and the same acceleration, but 32 % slower."
+    )
+    assert rest == [
+        "Slower in every scenario, most in slope-fast: 0.025 instead of 0.05 m/s.",
+        "More energy per metre in slope-fast: 77 instead of 70 J/m.",
+        "Better in 8, the same in 3 and worse in 4 of 15 figures.",
+    ]
+
+
+RATIOS = st.floats(0.2, 5.0) | st.floats(0.99, 1.01) | st.just(1.0)
+
+
+@given(st.lists(RATIOS, min_size=15, max_size=15), st.none() | st.floats(-3.0, 0.99))
+def test_words_hold_for_their_numbers(drawn: list[float], gain: float | None) -> None:
+    ratios = np.reshape(drawn, (3, 5))
+    first, *rest, last = words(ratios, gain)
+    overall = np.exp(np.log(ratios).mean(axis=0))
+    for quantity in QUANTITIES:
+        column = OBJECTIVE_NAMES.index(quantity.objective)
+        mean, by_scenario = overall[column], ratios[:, column]
+        change = 1.0 / mean if quantity.reciprocal else mean
+        terms = (quantity.better, quantity.worse)
+        says = {word: re.search(rf"(\S+ %) {word}\b", first) for word in terms}
+        assert (says[quantity.better] is not None) == (mean < 0.995), first
+        assert (says[quantity.worse] is not None) == (mean > 1.005), first
+        for found in filter(None, says.values()):
+            assert found[1] == percentage(change - 1.0)
+        (loss, *more) = [s for s in rest if s.startswith(quantity.worse.capitalize())] or [""]
+        assert bool(loss) == bool((by_scenario > 1.005).any())
+        assert not more
+        if loss:
+            worst = SCENARIOS[by_scenario.argmax()]
+            assert f"in {worst}: " in loss
+            assert ("in every scenario" in loss) == bool((by_scenario > 1.005).all())
+    if gain is not None:
+        better = "% better by fitness" in first
+        assert better == (gain > 0.005) or abs(abs(gain) - 0.005) < 1e-9
+        assert ("% worse by fitness" in first) == (gain < -0.005)
+    if (ratios < 0.995).all():
+        assert last == "Better in all 15 figures."
+    else:
+        assert "all" not in last
+        for word, count in (("better", (ratios < 0.995).sum()), ("worse", (ratios > 1.005).sum())):
+            counted = re.search(rf"{word} in (\d+)", last, re.IGNORECASE)
+            assert int(counted[1] if counted else 0) == count
+
+
+def test_values_are_in_users_units() -> None:
+    speed, energy, *_ = views(np.tile([1.0, 1.0, 1.0, 0.5, 0.8], (3, 1)))
+    assert (speed.name, speed.unit, energy.name, energy.unit) == ("speed", "m/s", "energy", "J/m")
+    figure = speed.scenarios["slope-fast"]
+    assert (figure.value, figure.reference) == pytest.approx((0.0625, 0.05))
+    assert figure.change == pytest.approx(0.25)
+    assert figure.judgement == "better"
+    assert energy.change == pytest.approx(-0.5)
+
+
+def test_a_scenario_in_which_the_reference_falls_is_left_out() -> None:
+    other = PUBLISHED.copy()
+    other[1] = np.nan
+    quantities = compared(tuning(), PUBLISHED, reference(other))
+    assert [list(view.scenarios) for view in quantities] == 5 * [["normal-fast", "loaded-slow"]]
+    other[:] = np.nan
+    assert compared(tuning(), PUBLISHED, reference(other)) == []
+    assert compared(tuning(), PUBLISHED, Reference("A", 20.0)) == []
+
+
+def test_over_worlds_a_figure_is_the_geometric_mean_of_worlds_in_which_both_walk() -> None:
+    spec = tuning(scenarios=["normal-fast"], worlds={"count": 3})
+    ratios = np.array([[1.0, 1.0, 1.0, 0.25, 1.0], [1.0, 1.0, 1.0, 1.0, 1.0], 5 * [np.nan]])
+    (energy,) = (view for view in views(ratios, spec) if view.name == "energy")
+    assert energy.scenarios["normal-fast"].value == pytest.approx(35.0)
+    assert energy.scenarios["normal-fast"].reference == pytest.approx(70.0)
+
+
+def test_bounds_of_a_design_are_named_and_those_that_can_be_widened_all_at_once() -> None:
+    spec = tuning().resolved()
+    space = spec.design_space()
+    middle = (space.low + space.high) / 2.0
+    assert bounds_reached(spec, middle) == ([], {})
+    assert list(bounds_in_words([], 9)) == []
+
+    design = np.where([v.name in ("FI1R", "FOMF") for v in space.variables], space.high, middle)
+    bounds, widened = bounds_reached(spec, design)
+    assert [(bound.name, bound.at) for bound in bounds] == [("FI1R", "high"), ("FOMF", "high")]
+    assert list(bounds_in_words(bounds, 9)) == [
+        "At a bound of the search: 2 of 9 variables, FI1R at 6000 counts and FOMF at 3."
+    ]
+    # The controller accepts no FOMF above 3.
+    assert widened == {"FI1R": "1500:8250"}

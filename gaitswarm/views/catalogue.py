@@ -106,7 +106,7 @@ class CaseView(View):
     description: Description
     needs: str | None = Field(
         description="Command that installs what is missing for it here; null if nothing is.",
-        examples=["pip install 'gaitswarm[search]'"],
+        examples=["pip install scikit-learn"],
     )
     settings_schema: dict[str, Any] = Field(
         description="JSON schema of its settings, with defaults, bounds and descriptions."

@@ -79,10 +79,10 @@ def test_optimizers_have_their_settings(client: httpx2.Client) -> None:
 def test_a_method_says_what_would_have_to_be_installed_for_it(
     client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    without = replace(METHODS["random"], extra="search", libraries=("no-such-library",))
+    without = replace(METHODS["random"], libraries=("no-such-library",))
     monkeypatch.setitem(METHODS, "random", without)
     needs = {item["name"]: item["needs"] for item in items(client, "optimizers")}
-    assert needs["random"] == "pip install 'gaitswarm[search]'"
+    assert needs["random"] == "pip install no-such-library"
     assert needs["auto"] is needs["pso"] is None
 
 

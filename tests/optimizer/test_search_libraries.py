@@ -16,17 +16,17 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from tests.optimizer.formula import SPEC
 
-OPTIONAL = ("pymoo", "PyNomad", "scipy.stats", "sklearn")
+OPTIONAL = ("pymoo", "PyNomad", "scipy.stats")
 """Modules that take long to import, or may be missing."""
 
 
 def test_a_job_whose_search_needs_a_missing_library_is_refused_with_the_way_out(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    method = replace(METHODS["random"], extra="search", libraries=("no-such-distribution",))
+    method = replace(METHODS["random"], libraries=("no-such-distribution",))
     monkeypatch.setitem(METHODS, "random", method)
     spec = SPEC.model_copy(update={"optimizer": OPTIMIZERS["random"]})
-    with pytest.raises(InvalidRequest, match=r"pip install 'gaitswarm\[search\]'") as refused:
+    with pytest.raises(InvalidRequest, match=r"pip install no-such-distribution") as refused:
         JobService(store).submit(spec)
     assert refused.value.field == "optimizer"
     assert "no-such-distribution" in str(refused.value)
@@ -40,11 +40,6 @@ def test_a_job_keeps_the_versions_of_the_libraries_of_its_search() -> None:
     other = kept.model_copy(update={"search_libraries": {"scipy": "0.1"}})
     assert kept.changes(other) == (f"scipy 0.1 instead of {kept.search_libraries['scipy']}",)
     assert kept.changes(kept) == ()
-
-
-def test_methods_that_need_an_extra_say_which_libraries_it_brings() -> None:
-    for name, method in METHODS.items():
-        assert not method.extra or method.libraries, name
 
 
 def test_no_method_imports_its_library_before_it_runs() -> None:

@@ -57,8 +57,6 @@ class Method:
     """Whether it learns from the designs that a job starts from. Otherwise these designs are
     evaluated first and the method begins as if there were none.
     """
-    extra: str = ""
-    """Optional dependencies of gaitswarm that it needs, as in `gaitswarm[extra]`."""
     libraries: tuple[str, ...] = ()
     """Distributions that its results depend on, besides those that every job depends on. Their
     versions are recorded, and a job resumes with the same versions only.
@@ -76,8 +74,7 @@ class Method:
     @property
     def remedy(self) -> str:
         """Command that installs what is missing."""
-        packages = f"'gaitswarm[{self.extra}]'" if self.extra else " ".join(self.missing)
-        return f"pip install {packages}"
+        return f"pip install {' '.join(self.missing)}"
 
 
 def from_generator(
@@ -85,7 +82,6 @@ def from_generator(
     summary: str,
     search: Callable[..., Proposals],
     *,
-    extra: str = "",
     libraries: tuple[str, ...] = (),
 ) -> Method:
     """Make a method of a generator function that yields positions and receives their fitness.
@@ -97,7 +93,6 @@ def from_generator(
         summary: One line for lists of methods, with the source.
         search: Function of (settings, space, budget, random) that returns the generator. A
             parameter `start`, None by default, receives a `Start`: evaluated designs to begin from.
-        extra: As in `Method`.
         libraries: As in `Method`.
     """
 
@@ -110,7 +105,6 @@ def from_generator(
         create,
         replays=True,
         uses_start="start" in inspect.signature(search).parameters,
-        extra=extra,
         libraries=libraries,
     )
 
@@ -166,10 +160,9 @@ _BUILT_IN: Final[dict[str, Method]] = {
     ),
     "bayesian": from_generator(
         BayesianSettings,
-        "Gaussian process with batches, in a trust region (scikit-learn; TuRBO, Eriksson 2019)",
+        "Bayesian: expected improvement of a Gaussian process, for few evaluations (Jones 1998)",
         bayesian,
-        extra="search",
-        libraries=("scikit-learn", "scipy", "threadpoolctl"),
+        libraries=("scipy",),
     ),
     "cma-es": Method(
         CmaEsSettings,

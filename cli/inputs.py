@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.cli.options import Place, full_id
+from gaitswarm.cli.options import Place, full_id, name_and_value
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.sim.controllers import CONTROLLERS, Controller, ControllerName
 from gaitswarm.sim.gait_variables import GAIT_VARIABLES
@@ -115,6 +115,10 @@ def build_spec(options: SpecOptions) -> AnySpec:
         fields["case"] = json_object(case, "case")
     _merge_settings(fields, data.get("optimizer", {}))
     _merge_worlds(fields, data.get("worlds"))
+    if (weights := fields.pop("scenario_weight", None)) is not None:
+        form = "NAME=WEIGHT, such as slope-fast=2"
+        pairs = [name_and_value(text, "scenario-weight", form) for text in weights]
+        fields["scenario_weights"] = dict(pairs)
     _set_start(fields, data)
     with_gait = fields.pop("with_gait", False)
     spec = job_spec(data, **fields)

@@ -272,6 +272,22 @@ class SpecOptions(GivenOptions):
             help="Also search the gait: cycle time, stride, height, duty factor and FIR filter.",
         ),
     ] = None
+    scenario_weight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=WEIGHT",
+            help="Weight of a scenario in the geometric mean, such as slope-fast=2 [default: 1];"
+            " repeatable.",
+        ),
+    ] = None
+    scenario_aggregate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mean|worst",
+            help="Judge designs by the mean over the scenarios, or by the worst one"
+            " [default: mean].",
+        ),
+    ] = None
     worlds: Annotated[
         int | None,
         typer.Option(

@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeAlias, TypedDict, TypeVar, Unpack, cast, overload
+from typing import Any, Final, Literal, TypeAlias, TypedDict, TypeVar, Unpack, cast, overload
 
 from pydantic import BaseModel, ValidationError
 
@@ -76,6 +76,8 @@ class SpecOptions(TypedDict, total=False):
     precision: Precision
     case: str | CaseSettings | Document | None
     worlds: TuningWorlds | Document | None
+    scenario_weights: Mapping[str, float]
+    scenario_aggregate: Literal["mean", "worst"]
 
 
 class ForkOptions(TypedDict, total=False):

@@ -810,7 +810,7 @@ class Jobs(ABC):
             Conflict: No design of it succeeds in all scenarios.
         """
         spec, columns = self._tuning(job_id, "objectives to trade")
-        vectors = objective_vectors(columns, worlds=spec.worlds)
+        vectors = objective_vectors(columns, aggregation=spec.aggregation)
         require_success(job_id, vectors)
         return pareto_front(columns, vectors, spec, most=most)
 
@@ -832,7 +832,9 @@ class Jobs(ABC):
         rows = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
         if not len(rows):
             raise NotFound(f"job {job_id} has no design {iteration}.{particle}")
-        if not np.isfinite(objective_vectors(columns.rows(rows), worlds=spec.worlds)).all():
+        if not np.isfinite(
+            objective_vectors(columns.rows(rows), aggregation=spec.aggregation)
+        ).all():
             raise Conflict(
                 f"design {iteration}.{particle} fails in a scenario, so it wins under no preference"
             )

@@ -1,4 +1,4 @@
-"""`--worlds` of `optimize` and `submit`: a search in many worlds."""
+"""Options of `optimize` and `submit` on the aggregation over worlds and scenarios."""
 
 from __future__ import annotations
 
@@ -70,3 +70,13 @@ def test_invalid_input_names_the_field(
     assert refused.code == 2
     assert said in refused.err
     assert not db.exists()
+
+
+def test_scenarios_are_weighed_by_name(gaitswarm: Gaitswarm, db: Path) -> None:
+    weights = ("--scenario-weight", "slope-fast=3", "--scenario-weight", "normal-slow=0.5")
+    spec = gaitswarm("submit", "--db", db, *weights, "--json").json["spec"]
+    assert spec["scenario_weights"] == {"slope-fast": 3.0, "normal-slow": 0.5}
+    worst = gaitswarm("submit", "--db", db, "--scenario-aggregate", "worst", "--json").json
+    assert worst["spec"]["scenario_aggregate"] == "worst"
+    refused = gaitswarm("submit", "--db", db, "--scenario-weight", "slope-fast")
+    assert (refused.code, "NAME=WEIGHT" in refused.err) == (2, True)

@@ -7,7 +7,7 @@ import numpy as np
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from gaitswarm.sim.outcome import Status
 
@@ -18,7 +18,7 @@ def columns_of(
     *,
     particles: int = 1,
     own: Preference = PREFERENCES["A"],
-    worlds: TuningWorlds | None = None,
+    aggregation: Aggregation | None = None,
 ) -> EvaluationColumns:
     """A job's history.
 
@@ -37,5 +37,5 @@ def columns_of(
         statuses=statuses,
         fitness=np.empty(rows),
     )
-    columns.fitness[:] = fitness_by(columns, own, worlds=worlds)
+    columns.fitness[:] = fitness_by(columns, own, aggregation=aggregation)
     return columns

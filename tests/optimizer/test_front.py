@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.analysis.front import (
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by, objective_vectors
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.jobs.preference import objective_vectors as stored_vectors
 from tests.examples.columns import columns_of
@@ -29,7 +29,7 @@ def front_of(
     columns: EvaluationColumns, worlds: TuningWorlds | None = None, most: int = 1000
 ) -> FrontView:
     """Iterations of its designs are their rows, where each has one particle."""
-    vectors = objective_vectors(columns, worlds=worlds)
+    vectors = objective_vectors(columns, aggregation=Aggregation(worlds))
     return pareto_front(columns, vectors, JobSpec(worlds=worlds), most=most)
 
 
@@ -173,7 +173,7 @@ def test_hypervolume_grows_iteration_by_iteration_in_the_box_of_the_whole() -> N
 def test_in_worlds_an_objective_is_what_the_job_makes_of_it_in_all_of_them() -> None:
     worlds = TuningWorlds(count=2, aggregate="worst")
     objectives = walks(50, 4)
-    columns = columns_of(objectives, worlds=worlds)
+    columns = columns_of(objectives, aggregation=Aggregation(worlds))
     by_scenario = np.exp(np.log(objectives.reshape(50, 2, 2, 5).max(axis=2)).mean(axis=1))
     front = front_of(columns, worlds)
     for design in front.designs:

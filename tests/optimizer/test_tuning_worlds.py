@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, log_utilities
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
@@ -70,7 +70,9 @@ def test_utilities_of_all_worlds_become_one(aggregate: Any, level: float, expect
     utilities = np.array([[3.0, 9.0, 1.0, 7.0, 5.0, 10.0, 2.0, 8.0, 4.0, 6.0]])
     (found,) = np.exp(worlds.aggregated(np.log(utilities)))
     assert found == pytest.approx([expected])
-    judged = worlds.judged(np.log(np.concatenate([utilities, 4.0 * utilities], axis=1)))
+    judged = Aggregation(worlds).judged(
+        np.log(np.concatenate([utilities, 4.0 * utilities], axis=1))
+    )
     assert judged.fitness == pytest.approx([2.0 * expected])
     if aggregate == "cvar" and level < 0.9:
         assert expected == pytest.approx(conditional_value_at_risk(utilities[0], level))
@@ -80,9 +82,9 @@ def test_a_failed_walk_is_infinitely_bad_unless_a_quantile_leaves_it_out() -> No
     logarithms = np.array([[0.0, math.inf, 1.0, 2.0]])
     for aggregate in ("mean", "worst", "cvar"):
         worlds = TuningWorlds.model_validate({"count": 4, "aggregate": aggregate})
-        assert worlds.judged(logarithms).fitness.tolist() == [math.inf]
+        assert Aggregation(worlds).judged(logarithms).fitness.tolist() == [math.inf]
     quantile = TuningWorlds(count=4, aggregate="quantile", level=0.75)
-    assert quantile.judged(logarithms).fitness == pytest.approx([math.exp(2.0)])
+    assert Aggregation(quantile).judged(logarithms).fitness == pytest.approx([math.exp(2.0)])
 
 
 def test_every_design_walks_in_the_same_worlds_of_every_scenario(
@@ -106,7 +108,7 @@ def test_every_design_walks_in_the_same_worlds_of_every_scenario(
         expected = np.concatenate([outcome.objectives for outcome in walked])
         assert evaluation.objectives.tobytes() == expected.tobytes()
         logs = log_utilities(expected, np.zeros(6, dtype=bool), PREFERENCES["A"])
-        assert evaluation.fitness == stored.worlds.judged(logs[np.newaxis]).fitness[0]
+        assert evaluation.fitness == Aggregation(stored.worlds).judged(logs[np.newaxis]).fitness[0]
 
 
 def test_it_is_ranked_by_another_preference_over_its_worlds(

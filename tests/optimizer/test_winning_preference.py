@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.analysis.preferences import PreferenceFitView,
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from tests.examples.columns import columns_of
 
@@ -166,9 +166,9 @@ def test_exponents_are_not_rounded_where_that_would_cost_the_place() -> None:
 
 def test_in_worlds_ranks_are_by_what_the_job_makes_of_all_worlds() -> None:
     worlds = TuningWorlds(count=2, aggregate="cvar", level=0.5)
-    columns = columns_of(history(40, seed=10, scenarios=4), own=A, worlds=worlds)
+    columns = columns_of(history(40, seed=10, scenarios=4), own=A, aggregation=Aggregation(worlds))
     row = int(columns.fitness.argmin())
     best = fits_of(columns, row, A, worlds)[0]
-    fitness = fitness_by(columns, best.preference, worlds=worlds)
+    fitness = fitness_by(columns, best.preference, aggregation=Aggregation(worlds))
     assert best.rank == 1 + np.count_nonzero(fitness < fitness[row])
     assert best.rank == 1

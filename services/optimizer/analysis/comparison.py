@@ -31,7 +31,10 @@ _PAGE: Final = 5000
 
 _SHARES: Final = np.linspace(0.0, 1.0, 101)
 
-_MEASURE: Final = {"kind", "robot", "scenarios", "preference", "worlds", "recordings", "targets"}
+_MEASURE: Final = {
+    *("kind", "robot", "scenarios", "preference", "worlds", "recordings", "targets"),
+    *("scenario_weights", "scenario_aggregate"),
+}
 """Fields of a spec that define fitness."""
 
 

@@ -204,7 +204,7 @@ def encoded_particles(
     for name, values in zip(spec.case_names, utilities(chosen, spec).T, strict=True):
         add(f"utility:{name}", unit, "utility", values)
     if objectives and isinstance(spec, JobSpec):
-        vectors = objective_vectors(chosen, worlds=spec.worlds).T
+        vectors = objective_vectors(chosen, aggregation=spec.aggregation).T
         for objective, values in zip(NORMALISED_OBJECTIVES, vectors, strict=True):
             add(f"objective:{objective.name}", objective.unit, "objective", values)
     header = ParticlesHeaderView(

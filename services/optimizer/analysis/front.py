@@ -258,7 +258,7 @@ def pareto_front(
     extremes = rows[[np.lexsort((sums, values))[0] for values in vectors[rows].T]]
     knees = front_knees(normalised, rows, extremes)
     winners = {
-        name: int(fitness_by(columns, preference, worlds=spec.worlds).argmin())
+        name: int(fitness_by(columns, preference, aggregation=spec.aggregation).argmin())
         for name, preference in NAMED.items()
     } | {"job": int(columns.fitness.argmin())}
 

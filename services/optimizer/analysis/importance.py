@@ -156,7 +156,7 @@ def _variables(
     failing = indices((~succeeded).astype(np.float64), np.ones_like(succeeded))
     objectives = {}
     if isinstance(spec, JobSpec):
-        vectors = objective_vectors(columns, worlds=spec.worlds)
+        vectors = objective_vectors(columns, aggregation=spec.aggregation)
         complete = succeeded & np.isfinite(vectors).all(axis=1)
         for column, name in enumerate(NORMALISED_NAMES):
             objectives[name] = indices(vectors[:, column], complete)

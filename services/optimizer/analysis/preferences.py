@@ -32,7 +32,7 @@ from gaitswarm.services.optimizer.analysis.utilities import (
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, swarm_uniform
 from gaitswarm.services.optimizer.views import (
@@ -104,7 +104,7 @@ class PreferenceForView(View):
     wins: bool = Field(description="Whether no design is better under the best of the fits.")
     certain: bool = Field(
         description="Whether it wins, or it is proven that no exponents with these biases let it"
-        " win; not proven for a job that judges in worlds."
+        " win; not proven for a job that judges in worlds or by the worst scenario."
     )
     fits: list[PreferenceFitView] = Field(
         description="One for each set of biases, the job's own and those of A, B and C, the best"
@@ -119,10 +119,10 @@ def preference_for(columns: EvaluationColumns, row: int, spec: JobSpec) -> Prefe
     cannot win, they give its best rank among the linear program's solution, where it is least
     behind, and some samples.
 
-    With worlds the linear program is an approximation: the aggregate of a product is not the
-    product of the aggregates.
+    Over worlds, and for the worst scenario, the linear program is an approximation: the aggregate
+    of a product is not the product of the aggregates.
     """
-    plain = objective_vectors(columns, worlds=spec.worlds)
+    plain = objective_vectors(columns, aggregation=spec.aggregation)
 
     def design(index: int) -> TradeOffDesignView:
         return TradeOffDesignView(**design_fields(columns, plain, spec, index))
@@ -133,11 +133,11 @@ def preference_for(columns: EvaluationColumns, row: int, spec: JobSpec) -> Prefe
         owners.setdefault(preference.bias, []).append(name)
     fits = []
     for bias, names in owners.items():
-        vectors = objective_vectors(columns, bias, worlds=spec.worlds)
+        vectors = objective_vectors(columns, bias, aggregation=spec.aggregation)
         others = np.flatnonzero((vectors != vectors[row]).any(axis=1))
         exponent = _exponents(vectors, row, others)
         exact, rounded = (
-            _fit(columns, row, others, Preference(bias=bias, exponent=tuple(e)), spec.worlds)
+            _fit(columns, row, others, Preference(bias=bias, exponent=tuple(e)), spec.aggregation)
             for e in (exponent.tolist(), np.round(exponent, _DECIMALS).tolist())
         )
         fits.append((names, rounded if rounded.rank <= exact.rank else exact))
@@ -148,7 +148,7 @@ def preference_for(columns: EvaluationColumns, row: int, spec: JobSpec) -> Prefe
         chosen=design(row),
         on_front=not better.any(),
         wins=wins,
-        certain=wins or spec.worlds is None,
+        certain=wins or (spec.worlds is None and spec.scenario_aggregate == "mean"),
         fits=[
             PreferenceFitView(
                 preference=fit.preference,
@@ -178,10 +178,10 @@ def _fit(
     row: int,
     others: Rows,
     preference: Preference,
-    worlds: TuningWorlds | None,
+    aggregation: Aggregation | None,
 ) -> _Fit:
     """Rank a design by a preference; others: rows not equal to it."""
-    fitness = fitness_by(columns, preference, worlds=worlds)
+    fitness = fitness_by(columns, preference, aggregation=aggregation)
     rank = int(np.count_nonzero(fitness[others] < fitness[row])) + 1
     rival = int(others[fitness[others].argmin()]) if len(others) else row
     if rival == row or not np.isfinite(fitness[rival]):
@@ -343,7 +343,7 @@ def robust_preferences(
     spec = tuning_spec(job_id, spec, "a preference")
     require_success(job_id, columns.fitness[:, np.newaxis])
     drawn = drawn_preferences(columns, count=request.drawn, seed=request.seed)
-    winners = preference_winners(columns, drawn, worlds=spec.worlds)
+    winners = preference_winners(columns, drawn, aggregation=spec.aggregation)
     chosen = winners[: max(request.candidates, sum(bool(winner.named) for winner in winners))]
     space, best = spec.design_space(), float(columns.fitness.min())
     designs = [space.shown(columns.designs[winner.row].tolist()) for winner in chosen]
@@ -405,16 +405,18 @@ def preference_winners(
     columns: EvaluationColumns,
     drawn: Sequence[Preference],
     *,
-    worlds: TuningWorlds | None = None,
+    aggregation: Aggregation | None = None,
 ) -> list[Winner]:
     """Return the winners under any of the preferences."""
     preferences = [*NAMED.values(), *drawn]
     names = [*NAMED, *("" for _ in drawn)]
-    best = np.array([fitness_by(columns, p, worlds=worlds).argmin() for p in preferences])
+    best = np.array([fitness_by(columns, p, aggregation=aggregation).argmin() for p in preferences])
     rows = np.unique(best)
     # Lead of each winner over the others, under every preference.
     winning = columns.rows(rows)
-    rivals = np.sort([np.log(fitness_by(winning, p, worlds=worlds)) for p in preferences], axis=1)
+    rivals = np.sort(
+        [np.log(fitness_by(winning, p, aggregation=aggregation)) for p in preferences], axis=1
+    )
     lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
     winners = []
     for row in rows.tolist():

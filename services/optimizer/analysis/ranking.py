@@ -74,7 +74,7 @@ class RankingView(View):
 def rank(columns: EvaluationColumns, spec: JobSpec, request: RankingRequest) -> RankingView:
     """Rank all designs by their stored objectives."""
     preference = request.resolved_preference()
-    fitness, before = fitness_by(columns, preference, worlds=spec.worlds), columns.fitness
+    fitness, before = fitness_by(columns, preference, aggregation=spec.aggregation), columns.fitness
     present = _best_first(before)
     ranks = {row: rank for rank, row in enumerate(present.tolist(), start=1)}
     rows = _best_first(fitness)[: request.top]

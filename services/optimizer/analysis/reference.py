@@ -35,7 +35,10 @@ NONE: Final = Reference(None, None)
 """For a job with a plug-in's case."""
 
 _JUDGED_BY: Final = frozenset(
-    {"robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"}
+    {
+        *("robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"),
+        *("scenario_weights", "scenario_aggregate"),
+    }
 )
 """Fields of a spec on which a reference depends."""
 

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, PREFERENCES, Preference
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.outcome import OBJECTIVES
@@ -94,30 +94,33 @@ def fitness_of(log_utility: Floats) -> Floats:
 
 
 def fitness_by(
-    columns: EvaluationColumns, preference: Preference, *, worlds: TuningWorlds | None = None
+    columns: EvaluationColumns, preference: Preference, *, aggregation: Aggregation | None = None
 ) -> Floats:
     """Return the (r,) fitness by a preference, +inf for a failed design."""
     logarithms = log_utilities(columns, preference)
-    return fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
+    return fitness_of(logarithms if aggregation is None else aggregation.aggregated(logarithms))
 
 
 def objective_vectors(
     columns: EvaluationColumns,
     bias: Sequence[float] = (0.0,) * 5,
     *,
-    worlds: TuningWorlds | None = None,
+    aggregation: Aggregation | None = None,
 ) -> Floats:
     """Return each design's (r, M) objectives over all scenarios, minimized.
 
-    Objective m is the fitness under a preference that weighs it alone. Without worlds, fitness
-    under any preference with these biases is the product of the objectives, each raised to its
-    exponent. A row is +inf if a simulation failed or lacks an objective.
+    Objective m is the fitness under a preference that weighs it alone. For a mean
+    over scenarios without worlds, fitness under any preference with these biases is the product of
+    the objectives, each raised to its exponent. A row is +inf if a simulation failed or lacks an
+    objective.
     """
     result = np.empty((len(columns), len(bias)))
     for m, exponent in enumerate(np.eye(len(bias)).tolist()):
         alone = Preference(bias=tuple(bias), exponent=tuple(exponent))
         logarithms = log_utilities(columns, alone)
-        result[:, m] = fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
+        result[:, m] = fitness_of(
+            logarithms if aggregation is None else aggregation.aggregated(logarithms)
+        )
     result[~np.isfinite(result).all(axis=1)] = np.inf
     return result
 

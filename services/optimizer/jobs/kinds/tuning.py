@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.designs import Scenarios
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
     Judgement,
@@ -34,6 +34,7 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.identification import Recordings
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import PluginSettings
 from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
@@ -43,6 +44,9 @@ from gaitswarm.sim.worlds import check_worlds
 from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 Floats = NDArray[np.float64]
+
+
+Weight = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
 
 
 class WalksSpec(Scenarios, Spec):
@@ -152,7 +156,11 @@ class JobSpec(WalksSpec):
 
     has_objective_vectors = True
 
-    outcome_independent_fields = WalksSpec.outcome_independent_fields | {"preference"}
+    outcome_independent_fields = WalksSpec.outcome_independent_fields | {
+        "preference",
+        "scenario_weights",
+        "scenario_aggregate",
+    }
 
     kind: Literal["tuning"] = Field(default="tuning", description="Tune a motor controller.")
     controller: ControllerName = Field(
@@ -181,6 +189,31 @@ class JobSpec(WalksSpec):
         " that the search favors robust designs; null: the nominal model alone.",
         examples=[None, {"count": 8, "aggregate": "cvar"}],
     )
+
+    scenario_weights: dict[str, Weight] = Field(
+        default_factory=dict,
+        description="Weights of scenarios in the geometric mean, by name; 1 for all others.",
+        examples=[{"slope-fast": 2.0}],
+    )
+    scenario_aggregate: Literal["mean", "worst"] = Field(
+        default="mean",
+        description="Aggregate of the utilities of all scenarios: `mean`, their weighted geometric"
+        " mean, or `worst`, the greatest of them.",
+    )
+
+    @model_validator(mode="after")
+    def _has_weighted_scenarios(self) -> JobSpec:
+        if not self.scenario_weights:
+            return self
+        if self.scenario_aggregate == "worst":
+            raise ValueError("scenario_weights: the worst scenario has no weight; omit them")
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in self.scenario_weights:
+            if name not in names:
+                raise ValueError(
+                    f"scenario_weights: the job has no scenario {name!r}; {instead_of(name, names)}"
+                )
+        return self
 
     @model_validator(mode="after")
     def _can_be_run(self) -> JobSpec:
@@ -270,20 +303,31 @@ class JobSpec(WalksSpec):
         return tuple(create_case(self.case, walk) for walk in walks)
 
     @property
+    def aggregation(self) -> Aggregation | None:
+        """Aggregation over worlds and scenarios; None for the plain geometric mean."""
+        worst = self.scenario_aggregate == "worst"
+        if self.worlds is None and not self.scenario_weights and not worst:
+            return None
+        names = (scenario.name for scenario in self.resolved_scenarios())
+        weights = tuple(self.scenario_weights.get(name, 1.0) for name in names)
+        return Aggregation(self.worlds, weights if self.scenario_weights else None, worst)
+
+    @property
     def further_libraries(self) -> tuple[str, ...]:
         """Distributions of a plug-in's controller and libraries of its case."""
         case = () if self.case is None else CASES[self.case.name].libraries
         return (*CONTROLLERS.distribution(self.controller), *case)
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Return fitness and utilities of n designs, over worlds where there are some.
+        """Return fitness and utilities of n designs, aggregated as the job says.
 
         Args:
             objectives: (n, K, m) raw objectives.
             failed: (n, K), true for a case without a result.
         """
         judged = super().judge(objectives, failed)
-        return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
+        aggregation = self.aggregation
+        return judged if aggregation is None else aggregation.judged(judged.log_utilities)
 
     def search_feedback(
         self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats
@@ -294,9 +338,9 @@ class JobSpec(WalksSpec):
         """
         if not METHODS[self.search.name].multi_objective:
             return fitness
-        if self.worlds is None:
+        if self.aggregation is None:
             return objective_vectors(objectives, failed)
-        return objective_vectors(objectives, failed, aggregate=self.worlds.aggregated)
+        return objective_vectors(objectives, failed, aggregate=self.aggregation.aggregated)
 
     def resolved(self) -> JobSpec:
         """Return the job with scenarios, preference, variables and optimizer written out."""

@@ -1,9 +1,10 @@
-"""Perturbed models for tuning, and the aggregation of their utilities"""
+"""Perturbed models for tuning, and the aggregation of utilities over worlds and scenarios"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, Literal, Self
 
@@ -81,15 +82,6 @@ class TuningWorlds(BaseModel):
         """Return names and values of each world."""
         return _drawn(self)
 
-    def judged(self, log_utilities: Floats) -> Judgement:
-        """Judge designs by the geometric mean of `aggregated` (eq. 4.2).
-
-        Args:
-            log_utilities: As for `aggregated`.
-        """
-        logarithms = self.aggregated(log_utilities)
-        return Judgement(geometric_mean(logarithms), log_utilities)
-
     def aggregated(self, log_utilities: Floats) -> Floats:
         """Return (n, K) logarithms of utilities over worlds, by scenario.
 
@@ -116,6 +108,37 @@ class TuningWorlds(BaseModel):
         size = self.count if self.aggregate == "mean" else max(1.0, tail)
         utilities = [math.exp(value - ordered[0]) for value in ordered]
         return ordered[0] + math.log(mean_of_greatest(utilities, size))
+
+
+@dataclass(frozen=True, slots=True)
+class Aggregation:
+    """Aggregation of utilities over worlds and scenarios, up to the geometric mean."""
+
+    worlds: TuningWorlds | None = None
+    weights: tuple[float, ...] | None = None  # of the scenarios, positive; None: all equal
+    worst: bool = False  # whether the worst scenario alone counts
+
+    def judged(self, log_utilities: Floats) -> Judgement:
+        """Judge designs by the geometric mean of `aggregated` (eq. 4.2).
+
+        Args:
+            log_utilities: As for `aggregated`.
+        """
+        return Judgement(geometric_mean(self.aggregated(log_utilities)), log_utilities)
+
+    def aggregated(self, log_utilities: Floats) -> Floats:
+        """Return (n, S) logarithms whose mean is that of the fitness.
+
+        Args:
+            log_utilities: (n, K), worlds varying fastest, +inf after a failure.
+        """
+        logarithms = log_utilities
+        if self.worlds is not None:
+            logarithms = self.worlds.aggregated(logarithms)
+        if self.weights is not None:
+            weights = np.array(self.weights)
+            logarithms = logarithms * (weights * (len(weights) / weights.sum()))
+        return logarithms.max(axis=1, keepdims=True) if self.worst else logarithms
 
 
 def _bounded(perturbation: Variable, custom: Variable) -> Variable:

@@ -84,8 +84,9 @@ class SimulationResult:
         statuses: (n, K) values of `Status`.
         objectives: (n, K, 6) raw objectives f1..f6 of table 4.1, to be minimized, in the units of
             `gaitswarm.OBJECTIVES`; NaN where there is none.
-        measurements: (n, K, 5) peak and mean current, motor heat, power and speed, in the order and
-            units of `gaitswarm.MEASUREMENTS`; NaN for a simulation that ended early.
+        measurements: (n, K, 10) currents, heat, power, speed, torque, attitude, foot clearance and
+            slip, in the order and units of `gaitswarm.MEASUREMENTS`; NaN for a simulation that
+            ended early.
         utilities: (n, K) bias-weighted products (eq. 3.8, 4.1), to be minimized; NaN where
             the simulation failed.
         fitness: (n,) geometric means of the utilities (eq. 4.2), to be minimized; NaN where any
@@ -226,6 +227,33 @@ class MeasurementsView(View):
         default=None, description="Mean electrical power of all motors [W].", examples=[12.4]
     )
     speed: Finite = Field(default=None, description="Mean forward speed [m/s].", examples=[0.187])
+    peak_torque: Finite = Field(
+        default=None,
+        description="Largest absolute torque that any gear passes to its link [N m].",
+        examples=[9.6],
+    )
+    roll: Finite = Field(
+        default=None,
+        description="Largest absolute roll of the body against the ground's plane [deg].",
+        examples=[3.1],
+    )
+    pitch: Finite = Field(
+        default=None,
+        description="Largest absolute pitch of the body against the ground's plane [deg].",
+        examples=[2.4],
+    )
+    foot_clearance: Finite = Field(
+        default=None,
+        description="Largest height of a sole above the ground in a gait cycle, least of all legs"
+        " and cycles [m].",
+        examples=[0.021],
+    )
+    slip: Finite = Field(
+        default=None,
+        description="Distance that feet slide on the ground, mean of all feet, per metre walked"
+        " [m/m]; also null where the robot stalled.",
+        examples=[0.35],
+    )
 
 
 class PlannedGaitView(View):
@@ -248,7 +276,7 @@ class SimulatedScenarioView(ScenarioResultView):
 
     measurements: MeasurementsView = Field(
         default_factory=MeasurementsView,
-        description="Currents, heat, power and speed of the walk.",
+        description="Further results of the walk, from currents to slip.",
     )
     gait: PlannedGaitView | None = Field(
         default=None, description="The planned gait: duty factor and static stability."

@@ -36,6 +36,7 @@ from gaitswarm.sim.kernel.walk import (
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.posture import resting_height
 from gaitswarm.sim.scenario import Scenario
 
@@ -161,6 +162,7 @@ def plan_walk(
         parameters,
         codes,
         fall_height=0.5 * scenario.hip_height,
+        cycle=max(1, math.floor(ticks / scenario.cycles)),
         energy=robot.description.supply.energy,
         direction=-1 if scenario.direction == "backward" else 1,
         drop=scenario.drop,
@@ -189,19 +191,30 @@ def judge(
     return Status.OK, objectives
 
 
-def measure(setup: WalkSetup, result: WalkResult, substeps: int) -> NDArray[np.float64]:
-    """Return `gaitswarm.sim.outcome.MEASUREMENTS` (5,), NaN for a walk that ended early."""
+def measure(
+    setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
+) -> NDArray[np.float64]:
+    """Return `gaitswarm.sim.outcome.MEASUREMENTS` (10,), NaN for a walk that ended early."""
     if result.status is not Status.OK:
         return np.full(N_MEASUREMENTS, np.nan)
     steps, motors = setup.ticks * substeps, setup.desired.shape[1]
-    forward_speed, _, absolute_current, heat = result.sums[4:].tolist()
+    forward_speed, _, absolute_current, heat, slip = result.sums[4:].tolist()
+    forward_speed *= setup.direction
+    current, torque, roll_tangent, pitch_sine = result.peaks.tolist()
+    walked = forward_speed * timestep >= SHORTEST_WALK
+    feet = motors // JOINTS_PER_LEG
     return np.array(
         [
-            result.peak_current,
+            current,
             absolute_current / (steps * motors),
             heat / steps,
             _energy_sum(setup, result) / steps,
-            setup.direction * forward_speed / steps,
+            forward_speed / steps,
+            torque,
+            math.degrees(math.atan(roll_tangent)),
+            math.degrees(math.asin(min(pitch_sine, 1.0))),
+            result.clearance if math.isfinite(result.clearance) else math.nan,
+            slip / (feet * forward_speed) if walked else math.nan,
         ]
     )
 

@@ -285,7 +285,7 @@ class CalibrationWalk:
             substeps = request.coding.substeps
             judged = judge(request.setup, result, substeps, timestep)
             statuses[index], objectives[index, :N_OBJECTIVES] = judged
-            objectives[index, N_OBJECTIVES:] = measure(request.setup, result, substeps)
+            objectives[index, N_OBJECTIVES:] = measure(request.setup, result, substeps, timestep)
         return Outcome(objectives, statuses)
 
     def drive(self, values: Mapping[str, float]) -> dict[str, float]:

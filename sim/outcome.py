@@ -96,6 +96,21 @@ MEASUREMENTS: Final[tuple[Measurement, ...]] = (
     Measurement("motor_heat", "W", "mean heat of all windings, R I^2"),
     Measurement("power", "W", "mean electrical power of all motors, as counted by f4"),
     Measurement("speed", "m/s", "mean speed in the direction of the walk"),
+    Measurement(
+        "peak_torque",
+        "N m",
+        "largest absolute torque that any gear passes to its link at any physics step",
+    ),
+    Measurement("roll", "deg", "largest absolute roll of the body against the ground's plane"),
+    Measurement("pitch", "deg", "largest absolute pitch of the body against the ground's plane"),
+    Measurement(
+        "foot_clearance",
+        "m",
+        "largest height of a sole above the ground in a gait cycle, least of all legs and cycles",
+    ),
+    Measurement(
+        "slip", "m/m", "distance that feet slide on the ground, mean of all feet, per metre walked"
+    ),
 )
 """Further results of a walk, in the order of a measurements array's columns."""
 
@@ -143,12 +158,17 @@ class Measurements:
     motor_heat: NDArray[np.float64]
     power: NDArray[np.float64]
     speed: NDArray[np.float64]
+    peak_torque: NDArray[np.float64]
+    roll: NDArray[np.float64]
+    pitch: NDArray[np.float64]
+    foot_clearance: NDArray[np.float64]
+    slip: NDArray[np.float64]
 
     @classmethod
     def of(cls, rows: NDArray[np.float64]) -> Measurements:
-        """Create measurements from rows (n, 5), columns as in `MEASUREMENTS`."""
+        """Create measurements from rows (n, 10), columns as in `MEASUREMENTS`."""
         return cls(**dict(zip(MEASUREMENT_NAMES, rows.T.copy(), strict=True)))
 
     def array(self) -> NDArray[np.float64]:
-        """Return an array (n, 5), columns as in `MEASUREMENTS`."""
+        """Return an array (n, 10), columns as in `MEASUREMENTS`."""
         return np.stack([getattr(self, name) for name in MEASUREMENT_NAMES], axis=1)

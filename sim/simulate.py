@@ -53,7 +53,7 @@ class Simulation:
     """Results of designs, in their order."""
 
     outcome: Outcome
-    measurements: Measurements  # currents, heat, power and speed
+    measurements: Measurements  # see `gaitswarm.sim.outcome.MEASUREMENTS`
     # if requested; None for designs that were not simulated (unreachable), NaN after an early end
     logs: tuple[WalkLog | None, ...] = ()
 
@@ -189,7 +189,7 @@ def walking(
     results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups.values()]
     for (index, setup), result in zip(setups.items(), results, strict=True):
         statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
-        measured[index] = measure(setup, result, coding.substeps)
+        measured[index] = measure(setup, result, coding.substeps, timestep)
         if result.states is not None:
             logs[index] = walk_log(robot, setup, result.states)
     return Simulation(

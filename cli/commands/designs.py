@@ -139,12 +139,14 @@ def _simulated(view: SimulationView) -> Parts:
     from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES
 
     yield results_table({"": view.scenarios}, OBJECTIVES)
-    heads = [f"{m.name.replace('_', ' ')}\n{m.unit}" for m in MEASUREMENTS]
-    measured = (
-        (name, *(number(getattr(result.measurements, m.name)) for m in MEASUREMENTS))
-        for name, result in view.scenarios.items()
-    )
-    yield table(["scenario", *heads], measured, title="Measured", gap=1)
+    # Two tables, each as wide as a terminal.
+    for title, columns in (("Measured", MEASUREMENTS[:5]), ("", MEASUREMENTS[5:])):
+        heads = [f"{m.name.replace('_', ' ')}\n{m.unit}" for m in columns]
+        measured = (
+            (name, *(number(getattr(result.measurements, m.name)) for m in columns))
+            for name, result in view.scenarios.items()
+        )
+        yield table(["scenario", *heads], measured, title=title, gap=1)
     yield f"fitness {worth(view)}, in {view.precision} precision"
     for name, result in view.scenarios.items():
         if result.gait is not None:

@@ -22,6 +22,7 @@ from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.kernel.lanes import plan_lanes
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.walk import (
+    PEAKS,
     Coding,
     LaneUse,
     Precision,
@@ -86,11 +87,12 @@ class Walker(ctypes.Structure):
         ("sensors", SensorErrorsStructure),
         ("shove", 2 * ctypes.c_int64),
         ("law", _Law),
-        ("ticks", ctypes.c_int64),
+        *_fields(ctypes.c_int64, "ticks", "cycle"),
         *_fields(ctypes.c_double, "fall_height", "fall_cosine"),
         ("smoothing", 2 * ctypes.c_double),
         *_fields(ctypes.c_void_p, "sums", "end", "log"),
-        ("peak_current", ctypes.c_double),
+        ("peaks", len(PEAKS) * ctypes.c_double),
+        ("clearance", ctypes.c_double),
         ("status", ctypes.c_int64),
     ]
 
@@ -285,7 +287,7 @@ class NativeKernel:
             walker.sensors = SensorErrorsStructure(errors.scales, errors.delays, errors.seed)
             walker.shove[:] = setup.shove_ticks
             walker.law = addresses.law(setup.control_law)
-            walker.ticks = setup.ticks
+            walker.ticks, walker.cycle = setup.ticks, setup.cycle
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine
             walker.smoothing[:] = setup.smoothing(1), setup.smoothing(coding.refinement)
@@ -300,7 +302,14 @@ class NativeKernel:
         ended = sorted(zip(order, walkers, strict=True), key=lambda pair: pair[0])
         return WalkResults(
             tuple(
-                WalkResult(Status(int(w.status)), sums[k], end[k], float(w.peak_current), logs[k])
+                WalkResult(
+                    Status(int(w.status)),
+                    sums[k],
+                    end[k],
+                    np.array(w.peaks),
+                    float(w.clearance),
+                    logs[k],
+                )
                 for k, w in ended
             ),
             LaneUse(use.walked, use.computed, use.timed, use.control),

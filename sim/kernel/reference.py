@@ -7,6 +7,7 @@ exactly.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Final
@@ -27,6 +28,7 @@ from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_mod
 from gaitswarm.sim.kernel.sensors import Sensors
 from gaitswarm.sim.kernel.walk import (
     INTEGRANDS,
+    PEAKS,
     Coding,
     LaneUse,
     WalkResult,
@@ -70,7 +72,8 @@ class ReferenceKernel:
         past, sensors = Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
         sensed = np.zeros(setup.desired.shape[1])
         inner = InnerLoop(self._robot, setup, coding)
-        sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
+        sums, peaks = np.zeros(len(INTEGRANDS)), np.zeros(len(PEAKS))
+        lifted, clearance = np.zeros(len(self._robot.legs)), math.inf
         rows: list[Floats] = []
         status, rounds = Status.OK, 0
         for tick, desired in enumerate(setup.desired):
@@ -104,12 +107,14 @@ class ReferenceKernel:
                     current = np.abs(step.current)
                     sensed = low_pass(sensed, current, setup.smoothing(refinement))
                     sums += step.integrands / refinement
-                    peak_current = max(peak_current, float(step.largest_current[0]))
+                    peaks, lifted = np.maximum(peaks, step.peaks), np.maximum(lifted, step.heights)
+            if (tick + 1) % setup.cycle == 0:
+                clearance, lifted = min(clearance, float(lifted.min())), np.zeros_like(lifted)
             status = status_of(step.q, step.v, step.internal_state, setup)
             if status is not Status.OK:
                 break
         states = padded_states(rows, setup.ticks) if log else None
-        return WalkResult(status, sums, step.q.copy(), peak_current, states), rounds
+        return WalkResult(status, sums, step.q.copy(), peaks, clearance, states), rounds
 
 
 class Stepper:
@@ -123,8 +128,8 @@ class Stepper:
             np.array(setup.parameters),
         )
         self.duty, self.disturbance, self.current = (np.zeros(n_joints) for _ in range(3))
-        self.integrands, self.largest_current = np.zeros(len(INTEGRANDS)), np.zeros(1)
-        self.landing = np.zeros(1)
+        self.integrands, self.peaks = np.zeros(len(INTEGRANDS)), np.zeros(len(PEAKS))
+        self.heights, self.landing = np.zeros(model.kick.numel_out(5)), np.zeros(1)
         self._at = model.layout.slices["timestep"]
         self._timestep = float(setup.parameters[self._at][0])
         self._push_at, self._shove_ticks = model.layout.slices["push"], setup.shove_ticks
@@ -136,7 +141,7 @@ class Stepper:
         self._kick = _buffered(
             model.kick,
             [*state, self.duty, self.disturbance, self.parameters],
-            [*kicked, self.current, self.integrands, self.largest_current, self.landing],
+            [*kicked, self.current, self.integrands, self.peaks, self.heights, self.landing],
         )
         self._drift = _buffered(model.drift, [*state, self._time], drifted)
         self._kicked = list(zip((self.v, self.internal_state), kicked, strict=True))

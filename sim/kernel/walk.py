@@ -37,11 +37,16 @@ INTEGRANDS: Final = (
     "absolute_power",
     "absolute_current",
     "heat",
+    "slip",
 )
 """Rates that a driver sums up at the middle of every step: squared gear torque sum [N2 m2], squared
 accelerations [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over the
 motors, the sums of the absolute electrical power [W], of the absolute current [A], and of the heat
-R I^2 [W]."""
+R I^2 [W]; over the feet on the ground, the sum of the speeds along it [m/s]."""
+
+PEAKS: Final = ("current", "torque", "roll_tangent", "pitch_sine")
+"""Of which a driver keeps the largest absolute value at the middle of any step: motors' currents
+[A], torques that gears pass to links [N m], and the body's attitude against the ground [1]."""
 
 CODE_LIMIT = 65535
 """Largest coded error or current; the robot's integers have 16 bits."""
@@ -148,6 +153,7 @@ class WalkSetup:
     desired: NDArray[np.int32]  # coded angles, (T, J) int32
     control_law: ControlLaw  # of every joint
     fall_height: float  # height of the body below which the robot has fallen [m]
+    cycle: int  # whole control ticks in a cycle of the gait
     fall_cosine: float = 0.5**0.5  # cosine of the tilt below which the robot has fallen
     # torques on the links, (T, J) [N m], or, with the parameter `displaced`, angles between
     # gearheads and links [rad]; or None
@@ -200,9 +206,12 @@ class WalkResult:
     """Result of one walk."""
 
     status: Status
-    sums: Floats  # `INTEGRANDS` summed over physics steps, shorter steps by their share, (8,)
+    sums: Floats  # `INTEGRANDS` summed over physics steps, shorter steps by their share, (9,)
     end: Floats  # final q, (7+J,)
-    peak_current: float  # largest |I| of any motor at any physics step [A]
+    peaks: Floats  # `PEAKS` of the whole walk, (4,)
+    # least over legs and whole cycles of the height to which a sole was lifted above the ground in
+    # the cycle [m]; infinite before the end of the first cycle
+    clearance: float
     # q, v, internal state, absolute current before the converters [A] and duty at every control
     # tick after its control, (T, 7+J + 6+J + I + J + J), NaN after an early end; None without a
     # log. See `observation.walk_log`.

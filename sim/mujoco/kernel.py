@@ -30,6 +30,7 @@ from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state
 from gaitswarm.sim.kernel.sensors import Sensors
 from gaitswarm.sim.kernel.walk import (
     INTEGRANDS,
+    PEAKS,
     Coding,
     LaneUse,
     WalkResult,
@@ -118,7 +119,8 @@ class MujocoKernel:
         n_joints = setup.desired.shape[1]
         past, sensors, sensed = Past.of(n_joints), Sensors(setup.sensors), np.zeros(n_joints)
         inner = InnerLoop(self._robot, setup, coding)
-        sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
+        sums, peaks = np.zeros(len(INTEGRANDS)), np.zeros(len(PEAKS))
+        lifted, clearance = np.zeros(len(self._robot.legs)), math.inf
         rows: list[Floats] = []
         status = Status.OK
         for tick, desired in enumerate(setup.desired):
@@ -143,17 +145,19 @@ class MujocoKernel:
                 integrands, current = step.step(duty, disturbance, shoved=begin <= tick < end)
                 sensed = low_pass(sensed, current, smoothing)
                 sums += share * integrands
-                peak_current = max(peak_current, float(current.max()))
+                peaks, lifted = np.maximum(peaks, step.peaks), np.maximum(lifted, step.heights)
                 if step.diverged:
                     break
             if step.diverged:
                 status = Status.DIVERGED
                 break
+            if (tick + 1) % setup.cycle == 0:
+                clearance, lifted = min(clearance, float(lifted.min())), np.zeros_like(lifted)
             status = status_of(step.q, step.v, step.internal_state, setup)
             if status is not Status.OK:
                 break
         states = padded_states(rows, setup.ticks) if log else None
-        return WalkResult(status, sums, step.q, peak_current, states)
+        return WalkResult(status, sums, step.q, peaks, clearance, states)
 
 
 class _Stepper:
@@ -170,7 +174,7 @@ class _Stepper:
         self._applied = self._d.qfrc_applied
         self._angles, self._rates = self._d.qpos[7:], self._velocity[6:]
         # Body 0 is the world, body 1 the robot's.
-        self._ahead = self._d.xmat[1, 0:6:3]
+        self._ahead, self._up = self._d.xmat[1, 0:6:3], self._d.xmat[1, 6:9]
         # Positions [m] and velocities [m/s] of the feet, by MuJoCo's sensors.
         self._of_feet: tuple[Floats, Floats] = tuple(self._d.sensordata.reshape(2, -1, 3))
         self._gears = gears_of(robot, numbers, setup.start[7:])
@@ -181,6 +185,8 @@ class _Stepper:
         self._feet = [int(m.site_bodyid[m.site(foot).id]) for foot in feet]
         self._displaced = bool(numbers["displaced"].any())
         self.diverged = False
+        # `PEAKS` of the last step, and heights of the soles (L,) [m] at its beginning.
+        self.peaks, self.heights = np.zeros(len(PEAKS)), np.zeros(len(feet))
         self._jammed = bool(numbers["jam_stiffness"].any())
 
     @property
@@ -249,6 +255,9 @@ class _Stepper:
             m.dof_frictionloss[6:] = dry.limits(motors, rates)
         (ahead_x, ahead_y), (x, y) = self._ahead.tolist(), self._velocity[:2].tolist()
         forward = (ahead_x * x + ahead_y * y) / math.hypot(ahead_x, ahead_y)
+        (position, velocity), (pitch, roll, level) = self._of_feet, self._up.tolist()
+        self.heights = position[:, 2] - numbers["sole"]
+        slip = np.hypot(velocity[:, 0], velocity[:, 1]) @ (self.heights < 0.0)
         mujoco.mj_fwdActuation(m, d)
         mujoco.mj_fwdAcceleration(m, d)
         mujoco.mj_fwdConstraint(m, d)
@@ -264,7 +273,8 @@ class _Stepper:
         loads = torque - self._gears.armature * gain[6:]
         if firm:
             dry.loads = loads
-        load = float(np.abs(loads).sum())
+        strains = np.abs(loads)
+        load = float(strains.sum())
         drive, acceleration, turn = actuation.drive, gain[:3], gain[3:6]
         current = np.abs(drive.current)
         power = drive.voltage * drive.current
@@ -278,8 +288,10 @@ class _Stepper:
                 np.abs(power).sum(),
                 current.sum(),
                 self._resistance @ (current * current),
+                slip,
             ]
         )
+        self.peaks = np.array([current.max(), strains.max(), abs(roll / level), abs(pitch)])
         return integrands, current
 
     def _derive(self) -> None:

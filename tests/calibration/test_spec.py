@@ -23,6 +23,11 @@ MEASURED = {
     "motor_heat": 1.5,
     "power": 6.5,
     "speed": 0.156,
+    "peak_torque": 4.0,
+    "roll": 0.5,
+    "pitch": 0.4,
+    "foot_clearance": 0.035,
+    "slip": 0.15,
 }
 PUBLISHED = [*OBJECTIVES, *(MEASURED[result.name] for result in RESULTS[N_OBJECTIVES:])]
 

@@ -42,8 +42,9 @@ def test_measurements_are_printed_in_their_units(
     result = gaitswarm("simulate", "--design", design, *FAST)
     view = gaitswarm("simulate", "--design", design, *FAST, "--json").json
     measurements = view["scenarios"]["normal-fast"]["measurements"]
-    assert "peak current" in result.out
-    assert f"{measurements['motor_heat']:.4g}" in result.out
+    for name in MEASUREMENT_NAMES:
+        assert name.replace("_", " ") in result.out
+        assert f"{measurements[name]:.4g}" in result.out
 
 
 def test_a_design_is_json_a_file_the_output_of_best_or_published(

@@ -59,6 +59,13 @@ def test_mishaps_act_in_mujoco_as_in_the_kernel(mishap: str) -> None:
     assert np.abs(ours[:5] / calm[:5] - 1.0).max() > 2.0 * apart
 
 
+def test_mujoco_measures_a_walk_as_the_kernel_does() -> None:
+    case = world_walk(STEP)
+    kernel = MujocoKernel(load_robot("szabadka2"))
+    ours, mujocos = (case.simulate(NOMINAL, kernel=engine) for engine in (None, kernel))
+    np.testing.assert_allclose(mujocos.measurements.array(), ours.measurements.array(), rtol=0.02)
+
+
 @pytest.mark.thorough("test_mishaps_act_in_mujoco_as_in_the_kernel")
 def test_a_world_is_another_one_in_mujoco_too_but_for_our_own_engine_nothing_changes() -> None:
     """All perturbations at once: masses, soles, battery, gears, noise, delays, slope and start."""

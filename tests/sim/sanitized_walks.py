@@ -70,7 +70,7 @@ def digest_of_walks(
         for result in kernel.walk(setups, coding, log=log):
             statuses.add(result.status)
             states = np.empty(0) if result.states is None else result.states
-            for array in (result.sums, result.end, states):
+            for array in (result.sums, result.end, result.peaks, states):
                 # What sign a NaN has is the compiler's choice.
                 digest.update(np.where(np.isnan(array), np.nan, array).tobytes())
     assert statuses == {Status.OK, Status.FELL, Status.DIVERGED}

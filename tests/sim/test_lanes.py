@@ -69,7 +69,7 @@ def varied_walks(kernel: NativeKernel, variant: RobotVariant, n: int) -> list[Wa
 
 def bits(result: WalkResult) -> tuple[Status, bytes]:
     states = np.empty(0) if result.states is None else result.states.ravel()
-    values = np.concatenate([result.sums, result.end, [result.peak_current], states])
+    values = np.concatenate([result.sums, result.end, result.peaks, [result.clearance], states])
     # What sign a NaN has is the compiler's choice.
     return result.status, np.where(np.isnan(values), np.nan, values).tobytes()
 

@@ -1,4 +1,4 @@
-"""Measurements of a walk besides its objectives: currents, heat, power and speed."""
+"""Measurements of a walk besides its objectives, from currents to slip."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from gaitswarm.sim.assembly import Backend, control_steps, measure, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel.native import native_kernel
-from gaitswarm.sim.kernel.observation import walk_log
-from gaitswarm.sim.kernel.walk import Coding
+from gaitswarm.sim.kernel.observation import WalkLog, walk_log
+from gaitswarm.sim.kernel.walk import Coding, WalkSetup
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, Measurements, Status
+from gaitswarm.sim.replay import replay
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.robot.description import EnergyConvention
-from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import Simulation, simulate
 from tests.examples.robots import changed
 from tests.examples.walks import short_walk, walk
@@ -46,7 +49,7 @@ def test_measurements_are_sums_over_every_physics_step(robot: Robot) -> None:
     speed = 0.5 * (log.joint_velocity[:-1] + log.joint_velocity[1:])
     current = (voltage - actuators.torque * speed) / actuators.resistance
     assert not np.allclose(current, log.current[:-1], rtol=0.01)
-    peak, mean, heat, power, forward = measure(setup, result, 1)
+    peak, mean, heat, power, forward, *_ = measure(setup, result, 1, 2e-4)
     assert peak == pytest.approx(np.abs(current).max(), rel=1e-9)
     assert mean == pytest.approx(np.abs(current).mean(), rel=1e-9)
     lost = (actuators.resistance * current**2).sum(axis=1)
@@ -56,7 +59,7 @@ def test_measurements_are_sums_over_every_physics_step(robot: Robot) -> None:
     assert power == pytest.approx(powers.sum(axis=1).mean(), rel=1e-9)
     for convention in get_args(EnergyConvention):
         changed_setup = dataclasses.replace(setup, energy=convention)
-        assert measure(changed_setup, result, 1)[3] == pytest.approx(
+        assert measure(changed_setup, result, 1, 2e-4)[3] == pytest.approx(
             counted[convention].sum(axis=1).mean(), rel=1e-9
         )
     assert forward == pytest.approx(result.end[0] / (setup.ticks * 2e-4), rel=0.01)
@@ -72,9 +75,79 @@ def test_shorter_steps_of_a_landing_count_by_their_share(robot: Robot) -> None:
     results = kernel.walk([setup], coding, log=False)
     # Counted in full, the shorter steps would make a tenth more.
     assert results.lane_use.walked > 1.1 * setup.ticks
-    *_, speed = measure(setup, results[0], coding.substeps)
+    speed = measure(setup, results[0], coding.substeps, timestep)[4]
     way = float(results[0].end[0])
     assert speed == pytest.approx(way / (setup.ticks * coding.substeps * timestep), rel=0.01)
+
+
+def attitudes(log: WalkLog) -> NDArray[np.float64]:
+    """Roll and pitch (T, 2) [deg] of a body that turned by yaw, pitch and roll."""
+    return Rotation.from_quat(log.base_orientation).as_euler("ZYX", degrees=True)[:, :0:-1]
+
+
+@pytest.mark.parametrize("scenario", [BRIEF, SCENARIOS[4]], ids=["level", "slope"])
+def test_attitude_torque_and_feet_are_those_of_the_log(robot: Robot, scenario: Scenario) -> None:
+    """The log shows every fifth step only, so that its extremes are a little smaller."""
+    run = walk(scenario, robot=robot, log=True)
+    (log,) = run.logs
+    assert log is not None
+    feet = replay(robot, log, rate=500).foot_position
+    soles = robot.contacts()[0].sole
+    heights = feet[:, :, 2] - soles
+    cycles = np.array_split(heights, round(scenario.cycles))
+    moves = np.linalg.norm(np.diff(feet[:, :, :2], axis=0), axis=2)
+    slid = moves[(heights[:-1] < 0.0) & (heights[1:] < 0.0)].sum() / feet.shape[1]
+    measured = run.measurements
+    logged = [
+        np.abs(log.load_torque).max(),
+        *np.abs(attitudes(log)).max(axis=0),
+        min(cycle.max(axis=0).min() for cycle in cycles),
+        slid / (measured.speed[0] * scenario.duration),
+    ]
+    np.testing.assert_allclose(measured.array()[0, 5:], logged, rtol=0.07)
+    assert (measured.array()[0, 5:9] > np.array(logged[:4]) - 1e-9).all()
+
+
+def test_attitude_is_relative_to_the_ground_and_yaw_is_none() -> None:
+    uphill, turning = (walk(SCENARIOS[k], robot="szabadka2").measurements for k in (4, 5))
+    assert 0.1 < uphill.pitch[0] < 2.0
+    assert 0.1 < turning.roll[0] < 2.0
+
+
+def test_a_cycle_in_which_one_foot_stays_on_the_ground_has_no_clearance(robot: Robot) -> None:
+    setup = planned(robot, SCENARIOS[0])
+    still = setup.desired.copy()
+    still[setup.cycle : 2 * setup.cycle, :3] = setup.desired[0, :3]
+    stood = dataclasses.replace(setup, desired=still)
+    high, low = (measured_of(robot, each)[8] for each in (setup, stood))
+    assert high > 0.01
+    assert low < 0.5 * high
+
+
+def test_a_walk_shorter_than_a_cycle_has_no_clearance(robot: Robot) -> None:
+    setup = planned(robot, BRIEF)
+    shorter = dataclasses.replace(setup, desired=setup.desired[:-1])
+    assert np.isfinite(measured_of(robot, setup)).all()
+    assert np.isnan(measured_of(robot, shorter)).tolist() == [False] * 8 + [True, False]
+
+
+def test_feet_of_a_robot_that_goes_nowhere_have_no_slip_per_metre() -> None:
+    standing = walk(short_walk(stride=1e-9), PI, "pi", robot="szabadka2")
+    assert standing.outcome.statuses.tolist() == [Status.STALLED]
+    assert np.isnan(standing.measurements.array()[0]).tolist() == [False] * 9 + [True]
+
+
+def planned(robot: Robot, scenario: Scenario) -> WalkSetup:
+    plan = plan_walk(robot, scenario, control_steps(robot)[1])
+    assert plan is not None
+    return plan(CONTROLLERS["pi"].compile(PI))
+
+
+def measured_of(robot: Robot, setup: WalkSetup) -> NDArray[np.float64]:
+    (coding, timestep), kernel = control_steps(robot), native_kernel(robot)
+    assert kernel is not None
+    (result,) = kernel.walk([setup], coding, log=False)
+    return measure(setup, result, coding.substeps, timestep)
 
 
 def test_power_and_speed_are_those_of_the_objectives() -> None:
@@ -85,9 +158,9 @@ def test_power_and_speed_are_those_of_the_objectives() -> None:
 
 
 def test_measurements_are_an_array_and_back() -> None:
-    rows = np.arange(10.0).reshape(2, 5)
+    rows = np.arange(20.0).reshape(2, 10)
     measurements = Measurements.of(rows)
-    assert measurements.motor_heat.tolist() == [2.0, 7.0]
+    assert measurements.motor_heat.tolist() == [2.0, 12.0]
     np.testing.assert_array_equal(measurements.array(), rows)
 
 

@@ -306,7 +306,7 @@ def test_full_output_is_the_torque_limit() -> None:
     (found,) = kernel_of(robot).walk([setup], coding, log=True)
     assert found.states is not None
     np.testing.assert_allclose(split_states(robot, found.states).duty[0], 1.0)
-    assert found.peak_current == pytest.approx(float(12.0 / (9.0 * 0.06)), rel=1e-6)
+    assert found.peaks[0] == pytest.approx(float(12.0 / (9.0 * 0.06)), rel=1e-6)
 
 
 def test_feed_forward_carries_the_robot_that_stands() -> None:

@@ -85,6 +85,11 @@ def body_integrands(
     return dot(linear, linear), dot(acceleration.angular, acceleration.angular), forward
 
 
+def body_lean(state: LinkState) -> tuple[Scalar, Scalar]:
+    """Absolute tangent of the roll and absolute sine of the pitch against the ground [1]."""
+    return ca.fabs(state.up[1] / state.up[2]), ca.fabs(state.up[0])
+
+
 def drifted(q: Sequence[Scalar], v: Sequence[Scalar], time: Scalar) -> list[Scalar]:
     """Positions after some time [s] at constant velocities."""
     turn = scale(time, _triple(v[3:6]))

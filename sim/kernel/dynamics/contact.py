@@ -47,6 +47,7 @@ class Foot:
     damping: Scalar  # of the normal force, while it is not clamped at zero [N s/m]
     penetration: Scalar  # of the sole into the ground, negative in the air [m]
     mobility: Scalar  # upper bound of the foot's acceleration under a force [1/kg]
+    squared_slip: Scalar  # squared speed along the ground, may be rounded below zero [m2/s2]
 
     def lands_within(self, time: float) -> Scalar:
         """Whether the foot may touch down within a time [s]."""
@@ -114,6 +115,7 @@ def foot_on_ground(
         damping=ground["damping"] * ((elastic > 0.0) * touching),
         penetration=penetration,
         mobility=mobility,
+        squared_slip=dot(velocity, velocity) - rising * rising,
     )
 
 
@@ -123,8 +125,8 @@ def linear_zone(
     """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6)."""
     del internal_state
     zone = ground["slip_velocity"]
-    # |v_t|^2 can be rounded below zero at rest; the bound of the linear zone covers that.
-    squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
+    # The bound of the linear zone covers a square below zero.
+    squared = foot.squared_slip
     pace = 1.0 / ca.sqrt(ca.fmax(squared, zone * zone))
     limit = ground["friction"] * foot.normal
     drag = limit * pace
@@ -181,7 +183,7 @@ def dead_zone(
     threshold = ground["stick_velocity"]
     # Identified speeds may cross: the friction then jumps at v_d.
     width = ca.fmax(ground["slip_velocity"] - threshold, 1e-9)
-    squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
+    squared = foot.squared_slip
     slip = ca.sqrt(ca.fmax(squared, threshold * threshold))
     pace, steepness = 1.0 / slip, 1.0 / width
     share = ca.fmin((slip - threshold) * steepness, 1.0)

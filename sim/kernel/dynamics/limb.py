@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Final
 
 import casadi as ca
@@ -84,6 +85,9 @@ class Held:
     drives: tuple[Drive, ...]
     armature: Scalars  # of the rotors, with half a step's damping [kg m2]
     landing: Scalar  # 1 if the foot may touch down within `LANDING_HORIZON`, else 0
+    # squared speed of the foot along the ground that it touches, 0 in the air [m2/s2]
+    squared_slip: Scalar
+    height: Scalar  # of the sole above the ground [m]
     # passed by the gearheads to the links, before the step; without backlash including the torque
     # that accelerates the rotors [N m]
     torques: Scalars
@@ -112,8 +116,9 @@ class After:
     currents: Scalars  # of the motors, at the step's middle [A]
     loads: Scalars  # torques passed by the gearheads to the links, at the step's middle [N m]
     # sums over the limb's motors at the step's middle: |load| [N m], electrical power [W], its
-    # absolute value [W], |current| [A], heat [W]; then the largest |current| [A], and 1 if the foot
-    # may touch down within `LANDING_HORIZON`, else 0
+    # absolute value [W], |current| [A], heat [W]; slip of the foot [m/s]; then the largest
+    # |current| [A] and |load| [N m], 1 if the foot may touch down within `LANDING_HORIZON`, else 0,
+    # and the height of the sole [m]
     tallies: Scalars
 
 
@@ -175,6 +180,8 @@ def before(
             drives,
             rotors,
             foot.lands_within(LANDING_HORIZON),
+            foot.touching * ca.fmax(foot.squared_slip, 0.0),
+            -foot.penetration,
             gear_torques,
             spins,
         ),
@@ -208,9 +215,7 @@ def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Sca
             loads.append(held.torques[k] - held.armature[k] * spin)
     powers = [voltage * current for voltage, current in zip(voltages, currents, strict=True)]
     sizes = [ca.fabs(current) for current in currents]
-    largest = sizes[0]
-    for size in sizes[1:]:
-        largest = ca.fmax(largest, size)
+    strains = [ca.fabs(load) for load in loads]
     heat = sum(j.resistance * (c * c) for j, c in zip(limb.joints, currents, strict=True))
     return After(
         accelerations,
@@ -218,13 +223,16 @@ def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Sca
         tuple(currents),
         tuple(loads),
         (
-            sum(ca.fabs(load) for load in loads),
+            sum(strains),
             sum(powers),
             sum(ca.fabs(power) for power in powers),
             sum(sizes),
             heat,
-            largest,
+            ca.sqrt(held.squared_slip),
+            reduce(ca.fmax, sizes),
+            reduce(ca.fmax, strains),
             held.landing,
+            held.height,
         ),
     )
 

@@ -20,6 +20,7 @@ import pinocchio as pin
 from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
 from gaitswarm.sim.kernel.dynamics.body import (
     body_integrands,
+    body_lean,
     body_of,
     body_state,
     drifted,
@@ -102,9 +103,9 @@ class PhysicsModel:
 
     @cached_property
     def kick(self) -> Any:
-        """v and internal state after a step at these positions; current (J), integrands (8) and
-        largest absolute current (1) at its middle; landing (1), 1 if a foot may touch down within
-        `limb.LANDING_HORIZON`.
+        """v and internal state after a step at these positions; current (J), integrands (9), peaks
+        (4) and heights of the soles (L) at its middle; landing (1), 1 if a foot may touch down
+        within `limb.LANDING_HORIZON`.
         """
         step = self._step(self._symbols.p["timestep"][0])
         return _function(
@@ -115,8 +116,9 @@ class PhysicsModel:
                 step.internal_state,
                 step.by_joint("currents"),
                 step.integrands(),
-                [step.tallies()[-2]],
-                [step.tallies()[-1]],
+                [reduce(ca.fmax, step.tally(6)), reduce(ca.fmax, step.tally(7)), *step.lean],
+                step.tally(9),
+                [reduce(ca.fmax, step.tally(8))],
             ],
         )
 
@@ -182,18 +184,19 @@ class _Step:
     velocity: Sequence[Scalar]
     internal_state: Sequence[Scalar]
     of_body: Sequence[Scalar]
+    lean: Sequence[Scalar]
 
     def by_joint(self, name: str) -> list[Scalar]:
         return [value for limb in self.after for value in getattr(limb, name)]
 
-    def tallies(self) -> list[Scalar]:
-        *sums, currents, landing = zip(*(limb.tallies for limb in self.after), strict=True)
-        return [*map(sum, sums), reduce(ca.fmax, currents), reduce(ca.fmax, landing)]
+    def tally(self, k: int) -> list[Scalar]:
+        """Tally k of every limb."""
+        return [limb.tallies[k] for limb in self.after]
 
     def integrands(self) -> list[Scalar]:
-        load, power, absolute_power, current, heat, _, _ = self.tallies()
+        load, power, *others = (sum(self.tally(k)) for k in range(6))
         acceleration, angular, forward = self.of_body
-        return [load * load, acceleration, angular, power, forward, absolute_power, current, heat]
+        return [load * load, acceleration, angular, power, forward, *others]
 
 
 def _step(
@@ -260,6 +263,7 @@ def _step(
             *(value for limb in befores for value in limb.carried),
         ],
         of_body=body_integrands(state, true, timestep),
+        lean=body_lean(state),
     )
 
 

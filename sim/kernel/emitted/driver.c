@@ -11,7 +11,7 @@ typedef struct {
   Walker *walker[LANES];
   Call *call[LANES];
   int walking[LANES];
-  int64_t tick[LANES], rounds_left[LANES];
+  int64_t tick[LANES], rounds_left[LANES], cycle_left[LANES]; /* ticks until a gait cycle ends */
   divec begins[HALVES]; /* lanes at the beginning of a control tick */
   wide q[NQ];
   wide motor[NJ]; /* motors' angles, with backlash */
@@ -25,7 +25,7 @@ typedef struct {
   Inner inner;
 #endif
   wide sums[N_INTEGRANDS];
-  vec peak;
+  vec peaks[N_PEAKS], lifted[NL], clearance; /* lifted: in this cycle */
   Sensors sensors; /* the largest and rarely used: last */
 } Lanes;
 
@@ -59,8 +59,12 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
     s->current[j][k] = s->sensed[j][k] = s->disturbance[j][k] = 0;
     OF_LANE(s->motor[j], k) = BACKLASH ? w->internal_state[j] : 0.0;
   }
-  s->peak[k] = s->landing[k] = 0;
+  for (int i = 0; i < N_PEAKS; i++) s->peaks[i][k] = 0;
+  for (int l = 0; l < NL; l++) s->lifted[l][k] = 0;
+  s->clearance[k] = (real)__builtin_inf();
+  s->landing[k] = 0;
   s->rounds_left[k] = 0;
+  s->cycle_left[k] = w->cycle;
   set_control(&s->gains, &s->past, k, &w->law);
   set_sensors(&s->sensors, k, &w->sensors);
   if (w->smoothing[0] < 1.0) s->filtered = 1;
@@ -78,7 +82,8 @@ static void leave(Lanes *s, int k, int64_t status)
   w->status = status;
   for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = OF_LANE(s->sums[i], k);
   for (int i = 0; i < NQ; i++) w->end[i] = OF_LANE(s->q[i], k);
-  w->peak_current = s->peak[k];
+  for (int i = 0; i < N_PEAKS; i++) w->peaks[i] = s->peaks[i][k];
+  w->clearance = s->clearance[k];
   s->walking[k] = 0;
   /* The last access to another call's memory. */
   __atomic_sub_fetch(&s->call[k]->left, 1, __ATOMIC_RELEASE);
@@ -251,7 +256,7 @@ static void drift(Lanes *s, int h, double steps)
 
 static void round_of_steps(Lanes *s, const Coding *c)
 {
-  vec integrands[N_INTEGRANDS], largest;
+  vec integrands[N_INTEGRANDS];
 #ifdef SINGLE
   vec q[NQ];
 #else
@@ -273,14 +278,23 @@ static void round_of_steps(Lanes *s, const Coding *c)
       for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[i][h]);
 #endif
     kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, s->shoved,
-         s->current, integrands, &largest, &s->landing);
+         s->current, integrands, s->peaks, s->lifted, &s->landing);
     for (int h = 0; h < HALVES; h++) drift(s, h, left ? 1.0 : 0.5);
     for (int i = 0; i < N_INTEGRANDS; i++)
       for (int h = 0; h < HALVES; h++)
         s->sums[i][h] += s->weight[h] * vec_widened(&integrands[i], h);
-    s->peak = vec_max(s->peak, largest);
     if (s->filtered) low_pass(s->sensed, s->current, s->smoothing);
   }
+}
+
+/* Heights of a lane's soles in a cycle that has ended. */
+static void end_cycle(Lanes *s, int k)
+{
+  for (int l = 0; l < NL; l++) {
+    if (s->lifted[l][k] < s->clearance[k]) s->clearance[k] = s->lifted[l][k];
+    s->lifted[l][k] = 0;
+  }
+  s->cycle_left[k] = s->walker[k]->cycle;
 }
 
 /* Finished walks leave their lanes; returns the number of walks in lanes. */
@@ -297,6 +311,7 @@ static int end_round(Lanes *s)
       walked += s->walking[k];
       if (--s->rounds_left[k] || !s->walking[k]) continue;
       s->tick[k]++;
+      if (!--s->cycle_left[k]) end_cycle(s, k);
       if (!sound[n]) leave(s, k, DIVERGED);
       else if (height[n] < w->fall_height || upright[n] < w->fall_cosine) leave(s, k, FELL);
       else if (s->tick[k] == w->ticks) leave(s, k, OK);

@@ -14,7 +14,14 @@ import casadi as ca
 import numpy as np
 
 from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
-from gaitswarm.sim.kernel.dynamics.body import body_integrands, body_of, body_state, pushed, solved
+from gaitswarm.sim.kernel.dynamics.body import (
+    body_integrands,
+    body_lean,
+    body_of,
+    body_state,
+    pushed,
+    solved,
+)
 from gaitswarm.sim.kernel.dynamics.drives import battery_voltage
 from gaitswarm.sim.kernel.dynamics.kinds import LimbKind, limb_kinds
 from gaitswarm.sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before
@@ -31,7 +38,7 @@ _PASSED: Final = 27
 _FORCE: Final = 21
 """Index of the force among them."""
 
-_N_TALLIES: Final = 7
+_N_TALLIES: Final = 10
 
 _CONSTANTS: Final = "constants"
 """Name of the input shared by all walks."""
@@ -214,7 +221,11 @@ class _Pieces:
         falling, true = solved(state, inertia, force)
         dt = s["timestep"][0]
         faster = [old + dt * rate for old, rate in zip(s["body"][:6], leaves(true), strict=True)]
-        outputs = [list(leaves(falling)), faster, body_integrands(state, true, dt)]
+        outputs = [
+            list(leaves(falling)),
+            faster,
+            [*body_integrands(state, true, dt), *body_lean(state)],
+        ]
         return self._function(inputs, outputs, symbols)
 
     def _limb_functions(self, limb: Limb, kind: LimbKind) -> tuple[Any, Any, int]:
@@ -339,17 +350,17 @@ def _passed_of(numbers: Sequence[Scalar]) -> tuple[Inertia, Force]:
 
 
 _KICK: Final = """\
-/* Advances velocities by a step at fixed positions; currents, integrands and the largest current
-   are those of its middle. landing: 1 if a foot may touch down within a control tick. shoved:
-   whether any walk's body may be pushed. */
+/* Advances velocities by a step at fixed positions; currents and integrands are those of its
+   middle, which also raises peaks and, by leg, the heights to which soles were lifted. landing: 1
+   if a foot may touch down within a control tick. shoved: whether any walk's body may be pushed. */
 static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec *disturbance,
                  const vec *p, const double *robot, int shoved, vec *current, vec *integrands,
-                 vec *largest, vec *landing)
+                 vec *peaks, vec *lifted, vec *landing)
 {{
   static const int start[{limbs}] = {{ {starts} }}, kind[{limbs}] = {{ {kinds} }};
   vec body[{body}], supply, held[{limbs}][{held}], gathered[{passed}];
-  vec spun[{joints}], springs[{joints}], carried[4], falling[6], of_body[3], tallies[{tallies}];
-  vec total[5];
+  vec spun[{joints}], springs[{joints}], carried[4], falling[6], of_body[5], tallies[{tallies}];
+  vec total[6];
   {before_limbs}
   if (shoved) {{
     {push_body}
@@ -361,22 +372,22 @@ static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec
 {copies}
   }}
   {solve_body}
-  *largest = *landing = SPLAT(0.0);
+  *landing = SPLAT(0.0);
   for (int l = 0; l < {limbs}; l++) {{
     switch (kind[l]) {{
 {after_calls}
     }}
-    for (int i = 0; i < 5; i++) total[i] = l ? total[i] + tallies[i] : tallies[i];
-    *largest = vec_max(*largest, tallies[5]);
-    *landing = vec_max(*landing, tallies[6]);
+    for (int i = 0; i < 6; i++) total[i] = l ? total[i] + tallies[i] : tallies[i];
+    for (int i = 0; i < 2; i++) peaks[i] = vec_max(peaks[i], tallies[6 + i]);
+    *landing = vec_max(*landing, tallies[8]);
+    lifted[l] = vec_max(lifted[l], tallies[9]);
   }}
   integrands[0] = total[0] * total[0];
   integrands[1] = of_body[0];
   integrands[2] = of_body[1];
   integrands[3] = total[1];
   integrands[4] = of_body[2];
-  integrands[5] = total[2];
-  integrands[6] = total[3];
-  integrands[7] = total[4];
+  for (int i = 2; i < 6; i++) integrands[3 + i] = total[i];
+  for (int i = 2; i < 4; i++) peaks[i] = vec_max(peaks[i], of_body[1 + i]);
 }}
 """

@@ -1,5 +1,5 @@
 /* Calls of gaitswarm_walk, each with its walkers, whose threads share a pool. Included after
-   sensors.c, control.c and the sizes NJ (joints), NI (internal state) and NP (parameters); before
+   sensors.c, control.c and the sizes NJ (joints), NL (legs), NI (internal state) and NP (parameters); before
    driver.c. */
 
 #include <sched.h>
@@ -7,7 +7,8 @@
 
 #define NQ (7 + NJ)
 #define NV (6 + NJ)
-#define N_INTEGRANDS 8
+#define N_INTEGRANDS 9
+#define N_PEAKS 4
 #define NLOG (NQ + NV + NI + 2 * NJ)
 
 enum { OK = 0, DIVERGED = 1, FELL = 2 };
@@ -23,7 +24,7 @@ typedef struct {
   SensorErrors sensors;
   int64_t shove[2]; /* first tick of the push, and the tick after its last */
   Law law;
-  int64_t ticks;
+  int64_t ticks, cycle; /* of the walk and of a cycle of its gait */
   double fall_height;  /* of the body over the ground [m] */
   double fall_cosine;  /* of the tilt */
   double smoothing[2]; /* of the current's analog low-pass, by a step and by one of a touchdown; 1
@@ -31,7 +32,9 @@ typedef struct {
   double *sums;        /* N_INTEGRANDS, summed over physics steps */
   double *end;         /* NQ, final position */
   double *log;         /* ticks x NLOG: q, v, internal state, sensed current, duty; or NULL */
-  double peak_current; /* largest |I| of any motor [A] */
+  double peaks[N_PEAKS]; /* largest |I| of any motor [A] and |torque| of any gear [N m]; largest
+                            absolute tangent of the body's roll and sine of its pitch */
+  double clearance; /* least height [m] to which any leg's sole was lifted in a cycle */
   int64_t status;
 } Walker;
 

@@ -51,6 +51,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
     return "\n".join(
         [
             f"#define NJ {robot.n_joints}",
+            f"#define NL {len(robot.legs)}",
             f"#define NP {layout.size}",
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",

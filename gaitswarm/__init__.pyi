@@ -21,6 +21,7 @@ from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
 from gaitswarm.services.optimizer.analysis.surface import SurfaceView
 from gaitswarm.services.optimizer.analysis.targets import TargetsView
+from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,
@@ -89,7 +90,7 @@ __all__ = [
     "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
-    "Variable", "VerificationView", "WalkLog", "__version__", "connect",
+    "Variable", "VerdictView", "VerificationView", "WalkLog", "__version__", "connect",
     "job_spec", "open", "optimize", "optimizers", "robustness",
     "simulate", "verify", "write_firmware",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 from gaitswarm.errors import JobEnded
 from gaitswarm.jobs.database import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
+from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.iteration import SUMMARY
 from gaitswarm.services.optimizer.jobs.job import JobState
@@ -78,6 +79,16 @@ class OptimizationResult:
         """
         with open_database(self.db, create=False) as jobs:
             return jobs.evaluations(self.job.id)
+
+    def verdict(self) -> VerdictView:
+        """The best design against the published or the start design, as `Jobs.verdict`.
+
+        Raises:
+            StoreUnavailable: The database can no longer be opened.
+            NotFound: Its file no longer exists.
+        """
+        with open_database(self.db, create=False) as jobs:
+            return jobs.verdict(self.job.id)
 
 
 _CONVERGENCE = ("index", "designs", *SUMMARY, "evaluate_seconds")

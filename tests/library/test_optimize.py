@@ -75,6 +75,13 @@ def test_convergence_and_evaluations_are_tables(finished: Finished) -> None:
     assert len(evaluations) == 6
 
 
+def test_the_verdict_is_that_of_the_jobs(finished: Finished) -> None:
+    verdict = finished.result.verdict()
+    assert verdict.sentences[0].startswith("Compared with published ")
+    with gaitswarm.open(finished.result.db) as jobs:
+        assert jobs.verdict(finished.result.job.id) == verdict
+
+
 def test_progress_is_reported_after_each_iteration_is_stored(db: Path) -> None:
     received: list[tuple[int, int]] = []
 

@@ -31,6 +31,7 @@ def optimizations() -> None:
     assert_type(run, gaitswarm.OptimizationResult)
     assert_type(run.best, gaitswarm.BestView)
     assert_type(run.evaluations(), gaitswarm.EvaluationTable)
+    assert_type(run.verdict(), gaitswarm.VerdictView)
     assert_type(gaitswarm.__version__, str)
 
 

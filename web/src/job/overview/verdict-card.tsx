@@ -24,7 +24,10 @@ export function VerdictCard({ verdict }: { verdict: Verdict }) {
           <Table caption="Change against the reference" rows={scenarios} columns={columns} />
         )}
         {widen !== null && (
-          <CopyBlock label="the command that queues a search within wider bounds" text={widen} />
+          <CopyBlock
+            label="the command that queues a search within wider bounds"
+            text={`${widen} --server ${location.origin}`}
+          />
         )}
       </div>
     </Card>

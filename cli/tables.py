@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec
-    from gaitswarm.sim.outcome import Objective
+    from gaitswarm.sim.outcome import Measurement, Objective
     from gaitswarm.sim.variables import Variable
     from gaitswarm.simulation import PlannedGaitView, SimulationView
     from gaitswarm.views.job import BestView, JobSummaryView, JobView, Spent
@@ -223,6 +223,21 @@ def results_table(
     return table(["scenario", "<status", "utility", *heads], rows, title="By scenario", gap=1)
 
 
+def measurements_tables(
+    results: Mapping[str, Mapping[str, float | None]],
+    measurements: Sequence[Objective | ObjectiveView | Measurement],
+) -> Iterator[Table]:
+    """Yield tables of measurements by scenario, each as wide as a terminal."""
+    for first in range(0, len(measurements), 5):
+        columns = measurements[first : first + 5]
+        heads = [f"{m.name.replace('_', ' ')}\n{m.unit}" for m in columns]
+        rows = (
+            (scenario, *(number(measured[m.name]) for m in columns))
+            for scenario, measured in results.items()
+        )
+        yield table(["scenario", *heads], rows, title="" if first else "Measured", gap=1)
+
+
 def _objective(name: str, value: float | None) -> str:
     # Losses of height are millimetres: show four decimals instead of four digits.
     return f"{value:.4f}" if name == "height_loss" and value is not None else number(value)
@@ -296,6 +311,9 @@ def best_parts(best: BestView, job: JobView) -> Parts:
     """Yield a job's best design and its results."""
     yield design_table(job.spec, {"best": best.design})
     yield results_table({"best": best.scenarios}, job.objectives)
+    if job.measurements:
+        measured = {name: result.measurements for name, result in best.scenarios.items()}
+        yield from measurements_tables(measured, job.measurements)
     yield from search_line(best)
 
 

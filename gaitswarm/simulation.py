@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
-from gaitswarm.services.optimizer.views import DesignValues, Finite, View, finite
+from gaitswarm.services.optimizer.views import DesignValues, View, finite
 from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -209,53 +209,6 @@ class WalkLogView(View):
         )
 
 
-class MeasurementsView(View):
-    """Measurements of a simulation besides its objectives; null where it ended early."""
-
-    peak_current: Finite = Field(
-        default=None,
-        description="Largest absolute current of any motor at any physics step [A].",
-        examples=[0.83],
-    )
-    mean_current: Finite = Field(
-        default=None, description="Mean absolute current of all motors [A].", examples=[0.12]
-    )
-    motor_heat: Finite = Field(
-        default=None, description="Mean heat in all windings, R I^2 [W].", examples=[1.6]
-    )
-    power: Finite = Field(
-        default=None, description="Mean electrical power of all motors [W].", examples=[12.4]
-    )
-    speed: Finite = Field(default=None, description="Mean forward speed [m/s].", examples=[0.187])
-    peak_torque: Finite = Field(
-        default=None,
-        description="Largest absolute torque that any gear passes to its link [N m].",
-        examples=[9.6],
-    )
-    roll: Finite = Field(
-        default=None,
-        description="Largest absolute roll of the body against the ground's plane [deg].",
-        examples=[3.1],
-    )
-    pitch: Finite = Field(
-        default=None,
-        description="Largest absolute pitch of the body against the ground's plane [deg].",
-        examples=[2.4],
-    )
-    foot_clearance: Finite = Field(
-        default=None,
-        description="Largest height of a sole above the ground in a gait cycle, least of all legs"
-        " and cycles [m].",
-        examples=[0.021],
-    )
-    slip: Finite = Field(
-        default=None,
-        description="Distance that feet slide on the ground, mean of all feet, per metre walked"
-        " [m/m]; also null where the robot stalled.",
-        examples=[0.35],
-    )
-
-
 class PlannedGaitView(View):
     """Properties of a planned gait, without simulation."""
 
@@ -274,10 +227,6 @@ class PlannedGaitView(View):
 class SimulatedScenarioView(ScenarioResultView):
     """Result of the design in one scenario, with its log if requested."""
 
-    measurements: MeasurementsView = Field(
-        default_factory=MeasurementsView,
-        description="Further results of the walk, from currents to slip.",
-    )
     gait: PlannedGaitView | None = Field(
         default=None, description="The planned gait: duty factor and static stability."
     )
@@ -329,7 +278,7 @@ class SimulationView(View):
                         "explanation": part.statuses[0].phrase,
                         "utility": finite(part.utility.item()),
                         "objectives": {n: finite(v.item()) for n, v in part.objectives.items()},
-                        "measurements": {n: v.item() for n, v in part.measurements.items()},
+                        "measurements": {n: finite(v.item()) for n, v in part.measurements.items()},
                         "gait": PlannedGaitView.model_validate(gait),
                         "log": next((WalkLogView.from_log(log) for log in part.logs if log), None),
                     }

@@ -1,9 +1,9 @@
 """Results as tables: by column as numpy arrays, and as files in CSV or Parquet.
 
 A table of evaluations has the columns iteration, particle, fitness; `design.<variable>`, a number,
-or the name of a categorical variable's choice; and for every case `<case>.status`, `<case>.utility`
-and `<case>.<objective>`. What does not exist is NaN in
-an array, null in Arrow, Parquet and pandas, and empty in CSV; floats are exact to the bit.
+or the name of a categorical variable's choice; and for every case `<case>.status`,
+`<case>.utility`, `<case>.<objective>` and `<case>.<measurement>`. What does not exist is NaN in an
+array, null in Arrow, Parquet and pandas, and empty in CSV; floats are exact to the bit.
 """
 
 from __future__ import annotations
@@ -105,6 +105,7 @@ class EvaluationTable(Table):
         variables: Names of the v variables, searched and fixed, in the order of `designs`.
         cases: Names of the K cases: scenarios, or recordings' short ids.
         objective_names: Names of the m objectives of a case.
+        measurement_names: Names of the q further quantities that were measured in a case.
     """
 
     def __init__(self, spec: Spec, evaluations: EvaluationColumns) -> None:
@@ -114,6 +115,7 @@ class EvaluationTable(Table):
         self.variables = tuple(variable.name for variable in spec.design_space().columns)
         self.cases = spec.case_names
         self.objective_names = tuple(objective.name for objective in spec.objectives)
+        self.measurement_names = tuple(quantity.name for quantity in spec.measurements)
 
     @classmethod
     def from_pieces(cls, spec: Spec, pieces: Iterable[EvaluationColumns]) -> Self:
@@ -159,7 +161,12 @@ class EvaluationTable(Table):
     @property
     def objectives(self) -> Floats:
         """(r, K, m) raw objectives, to be minimized, in their units; NaN where there is none."""
-        return _finite(self.evaluations.objectives)
+        return _finite(self.evaluations.objectives[:, :, : len(self.objective_names)])
+
+    @property
+    def measurements(self) -> Floats:
+        """(r, K, q) measurements, in their units; NaN where there is none."""
+        return _finite(self.evaluations.objectives[:, :, len(self.objective_names) :])
 
     @property
     def utilities(self) -> Floats:
@@ -202,7 +209,7 @@ def decoded_table(spec: Spec, content: bytes) -> EvaluationColumns:
         return [Status.from_label(label) for label in table.column(f"{case}.status").to_pylist()]
 
     cases, fitness = spec.case_names, numbers("fitness")
-    objectives = [numbers(f"{case}.{o.name}") for case in cases for o in spec.objectives]
+    objectives = [numbers(f"{case}.{o.name}") for case in cases for o in spec.columns]
     return EvaluationColumns(
         iteration=whole("iteration"),
         particle=whole("particle"),
@@ -255,8 +262,8 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
     for k, case in enumerate(spec.case_names):
         columns[f"{case}.status"] = _LABELS[rows.statuses[:, k]]
         columns[f"{case}.utility"] = _finite(utilities[:, k])
-        for objective, values in zip(spec.objectives, rows.objectives[:, k].T, strict=True):
-            columns[f"{case}.{objective.name}"] = _finite(values)
+        for column, values in zip(spec.columns, rows.objectives[:, k].T, strict=True):
+            columns[f"{case}.{column.name}"] = _finite(values)
     return columns
 
 
@@ -270,7 +277,7 @@ def _no_rows(spec: Spec) -> EvaluationColumns:
         iteration=np.empty(0, dtype=np.int64),
         particle=np.empty(0, dtype=np.int64),
         designs=np.empty((0, len(spec.design_space().names))),
-        objectives=np.empty((0, cases, len(spec.objectives))),
+        objectives=np.empty((0, cases, len(spec.columns))),
         statuses=np.empty((0, cases), dtype=np.uint8),
         fitness=np.empty(0),
     )

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 
 from gaitswarm.sim.case import Case, Walk
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.outcome import OBJECTIVES
+from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import MISSING, Plugin, Registry, check_is, check_name, version_of
 
 
@@ -36,12 +36,15 @@ class CaseFamily:
         create: Makes a case for a walk.
         libraries: Further distributions that it computes with; workers need them, and a job resumes
             with the same versions only.
+        measurements: Columns of its outcomes' objectives after those of a walk: quantities that
+            are stored, and that constraints may name.
     """
 
     settings: type[CaseSettings]
     summary: str
     create: CreateCase
     libraries: tuple[str, ...] = ()
+    measurements: tuple[Objective, ...] = ()
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -66,9 +69,10 @@ def create_case(settings: CaseSettings, walk: Walk) -> Case:
             f"{settings.name} needs packages that are not installed: pip install {needed}"
         )
     case = family.create(settings, walk)
-    if case.objectives != OBJECTIVES:
-        names = ", ".join(objective.name for objective in OBJECTIVES)
+    columns = (*OBJECTIVES, *family.measurements)
+    if case.objectives != columns:
+        names = ", ".join(column.name for column in columns)
         raise SimulationInputError(
-            f"{settings.name} does not have the objectives of a walk: {names}"
+            f"{settings.name} does not have the objectives of a walk and its measurements: {names}"
         )
     return case

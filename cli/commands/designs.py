@@ -26,6 +26,7 @@ from gaitswarm.cli.tables import (
     Bold,
     gait_in_words,
     interval,
+    measurements_tables,
     number,
     results_table,
     table,
@@ -139,14 +140,8 @@ def _simulated(view: SimulationView) -> Parts:
     from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES
 
     yield results_table({"": view.scenarios}, OBJECTIVES)
-    # Two tables, each as wide as a terminal.
-    for title, columns in (("Measured", MEASUREMENTS[:5]), ("", MEASUREMENTS[5:])):
-        heads = [f"{m.name.replace('_', ' ')}\n{m.unit}" for m in columns]
-        measured = (
-            (name, *(number(getattr(result.measurements, m.name)) for m in columns))
-            for name, result in view.scenarios.items()
-        )
-        yield table(["scenario", *heads], measured, title=title, gap=1)
+    measured = {name: result.measurements for name, result in view.scenarios.items()}
+    yield from measurements_tables(measured, MEASUREMENTS)
     yield f"fitness {worth(view)}, in {view.precision} precision"
     for name, result in view.scenarios.items():
         if result.gait is not None:

@@ -565,7 +565,7 @@ def _differences(
             same = (stored == here) & (np.signbit(stored) == np.signbit(here))
             same |= np.isnan(stored) & np.isnan(here)
             found: list[tuple[int, str, float | str | None, float | str | None]] = [
-                (row, spec.objectives[k].name, finite(stored[row, k]), finite(here[row, k]))
+                (row, spec.columns[k].name, finite(stored[row, k]), finite(here[row, k]))
                 for row, k in np.argwhere(~same).tolist()
             ]
             found += [

@@ -934,7 +934,7 @@ class Jobs(ABC):
     )
     def export(self, job_id: str, format: TableFormat = "csv") -> Iterator[bytes]:  # noqa: A002
         """Return one row per design: iteration, particle, fitness, `design.<variable>`, and for
-        every scenario `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`.
+        every scenario `<scenario>.status`, `.utility`, and objectives and measurements by name.
         Floats are exact.
 
         Args:

@@ -299,7 +299,10 @@ class JobView(JobSummaryView):
         description="Best design so far, judged in double precision; null while none walks in"
         " every scenario."
     )
-    objectives: list[ObjectiveView] = Field(description="Columns of its results.")
+    objectives: list[ObjectiveView] = Field(description="What its designs minimize.")
+    measurements: list[ObjectiveView] = Field(
+        default_factory=list, description="Further columns of its results."
+    )
     stored_spec: AnySpec | None = Field(
         alias="spec",
         description="Spec, with scenarios, preference and variables as they were on submission;"
@@ -330,16 +333,20 @@ class JobView(JobSummaryView):
     @classmethod
     def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
         """Make a view of a job; its best design is not shown if the spec cannot be read."""
-        view, objectives, spec = None, [], None
+        view, spec = None, None
+        columns: dict[str, list[ObjectiveView]] = {"objectives": [], "measurements": []}
         if job.readable:
             spec = job.spec
             view = None if best is None else BestView.from_evaluation(best, spec)
-            objectives = [ObjectiveView.model_validate(o) for o in spec.objectives]
+            columns = {
+                name: [ObjectiveView.model_validate(c) for c in getattr(spec, name)]
+                for name in columns
+            }
         return cls.model_validate(
             {
                 **_summary(job),
                 "best": view,
-                "objectives": objectives,
+                **columns,
                 "spec": spec,
                 "provenance": job.provenance,
                 "head": job.progress.head,

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
+from gaitswarm.sim.outcome import RESULTS, Outcome, Status
 from tests.examples.servers import Server
 
 PARTICLES = 4
@@ -98,7 +98,7 @@ def _ask(job: Job, index: int) -> Ask:
 def _completed(job: Job, index: int, *, failed: bool) -> CompletedIteration:
     """The first particle falls in the last scenario; the others are the better, the later."""
     number = np.arange(PARTICLES, dtype=np.float64)
-    objectives = np.full((PARTICLES, N_OBJECTIVES), 10.0) + number[:, None]
+    objectives = np.full((PARTICLES, len(RESULTS)), 10.0) + number[:, None]
     statuses = np.full(PARTICLES, Status.FELL if failed else Status.OK, dtype=np.uint8)
     last = statuses.copy()
     last[0] = Status.FELL

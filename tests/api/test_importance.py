@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
+from gaitswarm.sim.outcome import RESULTS, Outcome, Status
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +42,7 @@ def searched(store: Store) -> Job:
     p, i = share.T
     ask = Ask(0, space.low + share * (space.high - space.low), {})
     store.begin(claim, ask)
-    objectives = np.full((DESIGNS, N_OBJECTIVES), 10.0)
+    objectives = np.full((DESIGNS, len(RESULTS)), 10.0)
     objectives[:, 3] = 50.0 - 10.0 * p
     objectives[:, 0] = 5.0 + i
     failed = i > 0.8

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.views import StatusName
 from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
+from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, RESULTS, Status
 from gaitswarm.simulation import SimulationView, WalkLogView
 from gaitswarm.views.job import BestView, JobView
 from tests.api.conftest import Commit
@@ -34,6 +34,8 @@ def strict(text: str) -> Any:
 def test_objectives_and_statuses_are_the_simulators(job: Job) -> None:
     shown = JobView.from_job_and_best(job, None).objectives
     assert [(o.name, o.unit) for o in shown] == [(o.name, o.unit) for o in OBJECTIVES]
+    measured = JobView.from_job_and_best(job, None).measurements
+    assert [(o.name, o.unit) for o in measured] == [(m.name, m.unit) for m in MEASUREMENTS]
     assert get_args(StatusName) == tuple(status.label for status in Status)
 
 
@@ -42,7 +44,7 @@ def test_numbers_that_are_not_finite_are_null(job: Job) -> None:
         iteration=0,
         particle=0,
         design=np.zeros(len(job.spec.design_space().names)),
-        objectives=np.array([[np.nan] * N_OBJECTIVES, [np.inf] * N_OBJECTIVES]),
+        objectives=np.array([[np.nan] * len(RESULTS), [np.inf] * len(RESULTS)]),
         statuses=np.array([Status.DIVERGED, Status.STALLED], dtype=np.uint8),
         fitness=np.inf,
     )
@@ -88,7 +90,10 @@ def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(
     assert (read.iterations, read.evaluations) == (3, 12)
     assert read.best is not None and read.best_fitness == read.best.fitness == best.fitness
     assert list(read.best.design.values()) == best.design.tolist()
-    walks = [list(walk.objectives.values()) for walk in read.best.scenarios.values()]
+    walks = [
+        [*walk.objectives.values(), *walk.measurements.values()]
+        for walk in read.best.scenarios.values()
+    ]
     assert walks == best.objectives.tolist()
     assert read.model_dump_json() == sent
 
@@ -107,7 +112,9 @@ def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
     view = BestView.from_evaluation(replace(found, reevaluation=doubled), spec)
 
     assert view.fitness == doubled.fitness
-    walks = [list(walk.objectives.values()) for walk in view.scenarios.values()]
+    walks = [
+        [*walk.objectives.values(), *walk.measurements.values()] for walk in view.scenarios.values()
+    ]
     assert walks == doubled.objectives.tolist()
     assert view.search is not None
     assert (view.search.precision, view.search.fitness) == ("single", found.fitness)

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from gaitswarm.sim.outcome import OBJECTIVE_NAMES
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.commands import run_command
 
@@ -27,6 +27,7 @@ def expected(finished: Finished) -> list[dict[str, Any]]:
             | {f"design.{name}": value for name, value in evaluation["design"].items()}
             | {"short.status": walk["status"], "short.utility": walk["utility"]}
             | {f"short.{name}": walk["objectives"][name] for name in OBJECTIVE_NAMES}
+            | {f"short.{name}": walk["measurements"][name] for name in MEASUREMENT_NAMES}
         )
     return rows
 

@@ -19,6 +19,7 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evalua
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import open_evaluator, open_store
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES
 from tests.library.conftest import SMALL, Finished
 
 pytestmark = pytest.mark.slow
@@ -46,6 +47,18 @@ def test_the_finished_job_comes_with_its_best_design_and_history(finished: Finis
     assert result.iterations[-1].best_so_far == result.best.fitness
     again = gaitswarm.simulate(result.best.design, controller="pi", scenarios=["1", "6"])
     assert again.fitness.tolist() == [result.best.fitness]
+
+
+def test_every_evaluation_has_the_measurements_of_its_simulation(finished: Finished) -> None:
+    with gaitswarm.open(finished.db) as jobs:
+        table = jobs.evaluations(finished.id)
+    designs = [dict(zip(table.variables, row, strict=True)) for row in table.designs.tolist()]
+    again = gaitswarm.simulate(designs, controller="pi", scenarios=["1", "6"])
+    assert np.array_equal(table.measurements, again.measurements, equal_nan=True)
+    best = finished.result.best.scenarios
+    for k, scenario in enumerate(best.values()):
+        row = again.measurements[int(np.nanargmin(table.fitness)), k].tolist()
+        assert scenario.measurements == dict(zip(MEASUREMENT_NAMES, row, strict=True))
 
 
 def test_a_job_runs_on_the_identified_robot(tmp_path: Path) -> None:

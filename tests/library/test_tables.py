@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
 from gaitswarm.tables import EvaluationTable, Table, encoded_table
 
 SPEC = JobSpec(controller="pi", scenarios=("normal-fast", "2"), preference="C")
@@ -24,7 +24,7 @@ NASTY = (5e-324, 1.7976931348623157e308, 1e22, 1e23, 0.1 + 0.2, -0.0, 1234567890
 def columns() -> EvaluationColumns:
     """Ten designs of any bits; the third fell in the second scenario."""
     generator = np.random.default_rng(3)
-    objectives = generator.random((10, 2, 6))
+    objectives = generator.random((10, 2, len(SPEC.columns)))
     objectives[2, 1] = np.nan
     statuses = np.zeros((10, 2), dtype=np.uint8)
     statuses[2, 1] = Status.FELL
@@ -56,8 +56,10 @@ def test_its_arrays_are_those_of_the_evaluations(
     assert table.variables == ("P", "I")
     assert table.cases == CASES
     assert same_bits(table.designs, columns.designs)
-    assert np.array_equal(table.objectives, columns.objectives, equal_nan=True)
-    assert table.objectives.shape == (10, 2, len(table.objective_names))
+    assert np.array_equal(table.objectives, columns.objectives[:, :, :6], equal_nan=True)
+    assert np.array_equal(table.measurements, columns.objectives[:, :, 6:], equal_nan=True)
+    assert table.objective_names == OBJECTIVE_NAMES
+    assert table.measurement_names == MEASUREMENT_NAMES
     assert np.array_equal(table.iteration, columns.iteration)
     assert np.array_equal(table.particle, columns.particle)
     assert table.statuses[2].tolist() == ["ok", "fell"]
@@ -89,7 +91,8 @@ def test_it_counts_rows_and_lists_names_as_a_data_frame_does(table: EvaluationTa
     assert len(table) == 10
     assert list(table) == list(table.keys()) == list(dict(table))
     assert "fitness" in table and "best" not in table
-    assert repr(table) == "<EvaluationTable: 10 rows, 21 columns>"
+    columns = 3 + len(table.variables) + 2 * (2 + len(SPEC.columns))
+    assert repr(table) == f"<EvaluationTable: 10 rows, {columns} columns>"
 
 
 def test_arrow_has_null_where_an_array_has_nan(table: EvaluationTable) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.preference import Preference, judge
-from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.outcome import RESULTS, Status
 
 
 def columns_of(
@@ -21,8 +21,9 @@ def columns_of(
     preference: Preference | None = None,
     designs: NDArray[np.float64] | None = None,
 ) -> EvaluationColumns:
-    """objectives: (r, K, m); the job's own fitness is that of `preference`."""
-    rows = len(objectives)
+    """objectives: (r, K, m), measurements are 0; the job's own fitness is that of `preference`."""
+    rows, missing = len(objectives), len(RESULTS) - objectives.shape[2]
+    objectives = np.pad(objectives, ((0, 0), (0, 0), (0, missing)))
     if statuses is None:
         statuses = np.zeros(objectives.shape[:2], dtype=np.uint8)
     fitness = np.full(rows, math.inf)

@@ -66,7 +66,7 @@ def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
     for case in request.cases:
         assert isinstance(case, Walk)
         scenario = case.scenario
-        scale = scenario.cycle_time + scenario.slope + np.arange(1.0, 7.0)
+        scale = scenario.cycle_time + scenario.slope + np.arange(1.0, 1.0 + len(case.objectives))
         objectives = np.abs(request.designs.sum(axis=1, keepdims=True) - 0.7) * scale + 0.01
         statuses = np.full(len(request.designs), Status.OK, dtype=np.uint8)
         fallen = np.floor(request.designs[:, 0] * 1e6) % 7 == 0

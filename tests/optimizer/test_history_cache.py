@@ -14,6 +14,7 @@ from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Claim, Job
 from gaitswarm.services.optimizer.store import Store
+from gaitswarm.sim.outcome import RESULTS
 from tests.store.examples import ask, begun, completed
 
 INF = math.inf
@@ -44,7 +45,7 @@ def test_the_cache_reads_on_where_it_stopped(store: Store) -> None:
     cache = HistoryCache(store)
     job = store.job(claim.job.id)
     nothing = cache.columns(job)
-    assert len(nothing) == 0 and nothing.objectives.shape == (0, 2, 6)
+    assert len(nothing) == 0 and nothing.objectives.shape == (0, 2, len(RESULTS))
     for _ in range(4):
         go_on(store, claim, (4.0, INF), (2.0, 3.0))
         job = store.job(claim.job.id)

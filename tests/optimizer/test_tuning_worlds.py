@@ -106,7 +106,7 @@ def test_every_design_walks_in_the_same_worlds_of_every_scenario(
             for scenario in stored.resolved_scenarios()
         ]
         expected = np.concatenate([outcome.objectives for outcome in walked])
-        assert evaluation.objectives.tobytes() == expected.tobytes()
+        assert evaluation.objectives[:, :6].tobytes() == expected.tobytes()
         logs = log_utilities(expected, np.zeros(6, dtype=bool), PREFERENCES["A"])
         assert evaluation.fitness == Aggregation(stored.worlds).judged(logs[np.newaxis]).fitness[0]
 

@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import RESULTS, Outcome, Status
 
 LEASE = 30.0
 
@@ -55,8 +55,8 @@ def completed(
     n = len(fitness)
     generator = np.random.default_rng(1000 + iteration)
     failed = ~np.isfinite(fitness)
-    well = Outcome(generator.random((n, 6)), np.full(n, Status.OK, dtype=np.uint8))
-    objectives = generator.random((n, 6))
+    well = Outcome(generator.random((n, len(RESULTS))), np.full(n, Status.OK, dtype=np.uint8))
+    objectives = generator.random((n, len(RESULTS)))
     objectives[failed] = np.nan
     statuses = np.where(failed, Status.FELL, Status.OK).astype(np.uint8)
     outcomes = (well, Outcome(objectives, statuses))

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import RESULTS, Outcome, Status
 from tests.store.examples import LEASE, ask, begun, completed, spec
 from tests.store.test_bits import anything, column, finite, many
 
@@ -32,7 +32,7 @@ def test_columns_hold_what_was_committed(store: Store) -> None:
     go_on(store, claim, (4.0, INF), (INF, INF), (2.0, 3.0))
     columns = store.evaluation_columns(claim.job.id, 0, 3)
     assert columns is not None
-    assert columns.objectives.shape == (6, 2, 6)
+    assert columns.objectives.shape == (6, 2, len(RESULTS))
     assert columns.statuses[1].tolist() == [Status.OK, Status.FELL]
     assert columns.iteration.tolist() == [0, 0, 1, 1, 2, 2]
     assert columns.particle.tolist() == [0, 1] * 3

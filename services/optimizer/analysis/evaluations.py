@@ -20,11 +20,11 @@ from gaitswarm.services.optimizer.views import (
     View,
     finite,
 )
-from gaitswarm.sim.outcome import OBJECTIVES, Status
+from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Status
 
 
 class ObjectiveView(View):
-    """One thing that a job minimizes in every case."""
+    """A column of results: a quantity that a job minimizes or measures in every case."""
 
     name: str = Field(description="Name, as in results.", examples=["torque"])
     unit: str = Field(description="Its unit.", examples=["N m"])
@@ -45,6 +45,14 @@ class ScenarioResultView(View):
         description="Raw objectives by name, minimized; units are in the job's `objectives`, those"
         f" of table 4.1 {', '.join(f'{o.name} [{o.unit}]' for o in OBJECTIVES)}.",
         examples=[{"torque": 8.71, "acceleration": 1.77, "height_loss": 0.0038}],
+    )
+    measurements: dict[str, float | None] = Field(
+        default_factory=dict,
+        description="Further quantities by name, which are not minimized; units are in the job's"
+        " `measurements`; of the simulator: "
+        + ", ".join(f"{m.name} [{m.unit}]" for m in MEASUREMENTS)
+        + ".",
+        examples=[{"speed": 0.067, "peak_current": 2.1}],
     )
 
 
@@ -86,7 +94,7 @@ def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, 
     objectives = np.stack([evaluation.objectives for evaluation in evaluations])
     statuses = np.stack([evaluation.statuses for evaluation in evaluations])
     logs = spec.judge(objectives, statuses != Status.OK).log_utilities
-    columns = [objective.name for objective in spec.objectives]
+    columns = [[c.name for c in columns] for columns in (spec.objectives, spec.measurements)]
     return [
         {
             "iteration": evaluation.iteration,
@@ -104,22 +112,30 @@ def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, 
 
 def case_results(
     names: Sequence[str],
-    objectives: Sequence[str],
+    columns: Sequence[Sequence[str]],
     statuses: NDArray[np.uint8],
     values: NDArray[np.float64],
     log_utilities: NDArray[np.float64],
 ) -> dict[str, dict[str, Any]]:
-    """Return the fields of the `ScenarioResultView` of one design in each of K cases."""
+    """Return the fields of the `ScenarioResultView` of one design in each of K cases.
+
+    columns: names of the objectives, and of the measurements.
+    """
+    objectives, measurements = columns
+    count = len(objectives)
     # Few designs lack a number; checking each would dominate.
-    row_values = list if np.isfinite(values).all() else lambda row: list(map(finite, row))
+    rows = values.tolist()
+    if not np.isfinite(values).all():
+        rows = [list(map(finite, row)) for row in rows]
     return {
         name: {
             "status": (status := Status(code)).label,
             "explanation": status.phrase,
             "utility": finite(exponential(log)),
-            "objectives": dict(zip(objectives, row_values(row), strict=True)),
+            "objectives": dict(zip(objectives, row[:count], strict=True)),
+            "measurements": dict(zip(measurements, row[count:], strict=True)),
         }
         for name, code, row, log in zip(
-            names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
+            names, statuses.tolist(), rows, log_utilities.tolist(), strict=True
         )
     }

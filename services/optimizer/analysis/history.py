@@ -40,7 +40,7 @@ def iterations_of(rows: int, job: Job) -> int:
 
 
 DEFAULT_BYTES: Final = 512 << 20
-"""Ten jobs of 100 000 evaluations in six scenarios."""
+"""Some six jobs of 100 000 evaluations in six scenarios."""
 
 _LONGEST_WAIT: Final = 10.0
 """Time to wait for memory that other analyses use [s]."""
@@ -134,7 +134,7 @@ def _empty_columns(job: Job) -> EvaluationColumns:
         iteration=np.empty(0, dtype=np.int64),
         particle=np.empty(0, dtype=np.int64),
         designs=np.empty((0, len(spec.design_space().names))),
-        objectives=np.empty((0, cases, len(spec.objectives))),
+        objectives=np.empty((0, cases, len(spec.columns))),
         statuses=np.empty((0, cases), dtype=np.uint8),
         fitness=np.empty(0),
     )

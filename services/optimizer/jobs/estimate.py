@@ -107,7 +107,7 @@ _LONGEST_WALK: Final = 5.0
 _REMEMBERED: Final = 64
 
 _MOST_WALKS: Final = 1_000_000
-"""Limit on simulations per iteration: their objectives, 48 B each, are in memory together."""
+"""Limit on simulations per iteration: their results, some 130 B each, are in memory together."""
 
 
 @dataclass(frozen=True, slots=True)

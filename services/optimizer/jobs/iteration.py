@@ -26,7 +26,7 @@ class EvaluationColumns:
     iteration: NDArray[np.int64]  # (r,) from 0
     particle: NDArray[np.int64]  # (r,) from 0
     designs: Floats  # (r, v) values of `Spec.design_space().names`, in the variables' units
-    # (r, K, m) raw objectives, cases and objectives in the spec's order, NaN if missing
+    # (r, K, m) raw results: cases and `Spec.columns` in order, NaN if missing
     objectives: Floats
     statuses: NDArray[np.uint8]  # (r, K) values of `gaitswarm.sim.outcome.Status`
     fitness: Floats  # (r,) by the job's own measure, minimized, +inf if a case failed
@@ -74,7 +74,7 @@ class Evaluation:
     iteration: int
     particle: int
     design: Floats  # (v,) values of `Job.spec.design_space().names`
-    # (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN if missing
+    # (K, m) raw results by case, columns as in `Spec.columns`, NaN if missing
     objectives: Floats
     statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
     fitness: float  # minimized, +inf if any case failed

@@ -296,7 +296,17 @@ class Spec(BaseModel):
     @property
     @abstractmethod
     def objectives(self) -> tuple[Objective, ...]:
-        """The m columns of a design's raw objectives in one case."""
+        """What designs minimize in one case: the first columns of its raw results."""
+
+    @property
+    def measurements(self) -> tuple[Objective, ...]:
+        """Further columns of a design's raw results in one case, which are not minimized."""
+        return ()
+
+    @property
+    def columns(self) -> tuple[Objective, ...]:
+        """The m columns of a design's raw results in one case."""
+        return (*self.objectives, *self.measurements)
 
     @property
     @abstractmethod

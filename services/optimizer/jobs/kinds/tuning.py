@@ -28,20 +28,20 @@ from gaitswarm.services.optimizer.jobs.preference import (
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import METHODS
-from gaitswarm.sim.case import Case, Walk
+from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.outcome import OBJECTIVES, Objective
+from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, RESULTS, Objective
 from gaitswarm.sim.plugins import PluginSettings
 from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
 from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_worlds
-from gaitswarm.sim.worlds.walks import PerturbedWalk
+from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk
 
 Floats = NDArray[np.float64]
 
@@ -283,24 +283,28 @@ class JobSpec(WalksSpec):
             return names
         return tuple(f"{name}.world-{k}" for name in names for k in range(self.worlds.count))
 
+    @property
+    def measurements(self) -> tuple[Objective, ...]:
+        """Measurements of the simulator, or of a plug-in's case."""
+        return RESULTS[N_OBJECTIVES:] if self.case is None else CASES[self.case.name].measurements
+
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
         """Return one case for each scenario, or for each world in each scenario."""
         names = self.design_space().names
         if self.worlds is not None:
             pairs = product(self.resolved_scenarios(), self.worlds.drawn())
             return tuple(
-                PerturbedWalk(
+                MeasuredPerturbedWalk(
                     name, self.robot, self.controller, scenario, world, names, self.precision
                 )
                 for name, (scenario, world) in zip(self.case_names, pairs, strict=True)
             )
+        walk = MeasuredWalk if self.case is None else Walk
         walks = tuple(
-            Walk(self.robot, self.controller, scenario, names, self.precision)
+            walk(self.robot, self.controller, scenario, names, self.precision)
             for scenario in self.resolved_scenarios()
         )
-        if self.case is None:
-            return walks
-        return tuple(create_case(self.case, walk) for walk in walks)
+        return walks if self.case is None else tuple(create_case(self.case, w) for w in walks)
 
     @property
     def aggregation(self) -> Aggregation | None:

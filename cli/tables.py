@@ -333,7 +333,9 @@ def verdict_table(verdict: VerdictView) -> Table:
         [name, *(_change(quantity.scenarios.get(name)) for quantity in verdict.quantities)]
         for name in scenarios
     ]
-    heads = (f"{SHORT.get(q.name, q.name)}\n{q.unit}" for q in verdict.quantities)
+    heads = (
+        f"{SHORT.get(q.name, q.name.replace('_', ' '))}\n{q.unit} %" for q in verdict.quantities
+    )
     title = "Best design, and change against the reference"
     return table(["scenario", *heads], rows, title=title, gap=1)
 
@@ -345,7 +347,7 @@ def _change(figure: FigureView | None) -> tuple[str, str]:
         return MISSING, ""
     style = {"better": "green", "worse": "red"}.get(figure.judgement, "")
     change = f"{'-' if figure.change < 0.0 else '+'}{percentage(figure.change)}"
-    return f"{number(figure.value, 3)} {change}".replace(" ", "\xa0"), style
+    return f"{number(figure.value, 3)} {change.removesuffix(' %')}", style
 
 
 def lineage_line(lineage: Lineage) -> str:

@@ -21,6 +21,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.store import Store
+from gaitswarm.sim.outcome import RESULTS
 from gaitswarm.views.job import JobSummaryView
 from tests.api.conftest import Commit
 from tests.examples.walks import quadruped_files
@@ -60,7 +61,7 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
     assert [energy["reference"] for energy in energies] == [
         pytest.approx(walk["scenarios"]["brief"]["objectives"]["energy"])
     ]
-    assert len(found["quantities"]) == sum(found["figures"].values()) == 5
+    assert (len(found["quantities"]), sum(found["figures"].values())) == (6, 5)
     assert found["sentences"][0].startswith("Compared with published B, ")
 
     monkeypatch.setattr(references, "walked_reference", None)
@@ -188,4 +189,4 @@ def test_in_many_worlds_the_reference_walks_in_them_too() -> None:
     assert many.fitness != nominal.fitness
     for reference, cases in ((many, 2), (nominal, 1)):
         assert replace(reference, fitness=0.0, results=b"") == Reference("A", 0.0)
-        assert reference.objectives(cases).shape == (cases, 6)
+        assert reference.objectives(cases).shape == (cases, len(RESULTS))

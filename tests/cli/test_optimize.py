@@ -321,8 +321,9 @@ def test_json_has_every_bit_of_stored_values(finished: Finished, gaitswarm: Gait
     shown = [evaluation for i in result["iterations"] for evaluation in i["evaluations"]]
     assert [e["fitness"] for e in shown] == [e.fitness for e in stored]
     assert [list(e["design"].values()) for e in shown] == [e.design.tolist() for e in stored]
-    walks = [list(e["scenarios"]["short"]["objectives"].values()) for e in shown]
-    assert walks == [e.objectives[0].tolist() for e in stored]
+    walks = [e["scenarios"]["short"] for e in shown]
+    results = [[*w["objectives"].values(), *w["measurements"].values()] for w in walks]
+    assert results == [e.objectives[0].tolist() for e in stored]
 
 
 def test_a_repeated_job_simulates_only_without_the_cache(

@@ -6,6 +6,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final, Literal
 
 import numpy as np
@@ -19,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.views import Finite, JobName, View
-from gaitswarm.sim.outcome import OBJECTIVE_NAMES
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ class Quantity:
 
     name: str
     unit: str
-    objective: str  # objective that measures it
+    column: str  # result that measures it
     better: str  # word after a percentage
     worse: str
     reciprocal: bool = False  # of the objective
@@ -53,8 +54,14 @@ QUANTITIES: Final = (
         "more angular acceleration",
     ),
     Quantity("torque", "N m", "torque", "less torque", "more torque"),
+    Quantity("peak_current", "A", "peak_current", "less peak current", "more peak current"),
 )
-"""Quantities that are compared. The loss of height, a difference near zero, has no ratio."""
+"""Quantities that are compared. The loss of height, a difference near zero, has no ratio.
+
+Those that are objectives count as figures.
+"""
+
+_COLUMNS: Final = tuple(result.name for result in RESULTS)
 
 
 class FigureView(View):
@@ -110,7 +117,7 @@ class VerdictView(View):
     )
     quantities: list[QuantityView] = Field(description="Compared quantities; empty without any.")
     figures: dict[Judgement, int] = Field(
-        description="Number of figures (quantities in scenarios) by judgement.",
+        description="Number of figures (objectives in scenarios) by judgement.",
         examples=[{"better": 22, "same": 1, "worse": 7}],
     )
     bounds: list[BoundView] = Field(description="Variables at a bound of the search.")
@@ -144,7 +151,7 @@ def verdict(job: Job, best: Evaluation | None, reason: str | None) -> VerdictVie
             options = (("--bounds", f"{name}={ends}") for name, ends in widened.items())
             call = ("fork", job.id, "--from", str(job.progress.iterations))
             widen = shlex.join(("gaitswarm", *call, *(word for pair in options for word in pair)))
-    counts = Counter(f.judgement for q in quantities for f in q.scenarios.values())
+    counts = counted(quantities)
     return VerdictView(
         id=job.id,
         reference=ReferenceView.from_reference(reference),
@@ -164,14 +171,20 @@ def compared(spec: JobSpec, objectives: Floats, reference: Reference) -> list[Qu
     if not reference.results:
         return []
     names = [scenario.name for scenario in spec.resolved_scenarios()]
-    both = np.stack([objectives, reference.objectives(len(objectives))])
+    other = reference.objectives(len(objectives))
+    # Made-up or older results may have fewer measurements.
+    width = min(objectives.shape[1], other.shape[1])
+    both = np.stack([objectives[:, :width], other[:, :width]])
     walked = np.isfinite(both[:, :, : len(OBJECTIVE_NAMES)]).all(axis=(0, 2))
     worlds = len(objectives) // len(names)
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithms = np.log(both)
     views = []
     for quantity in QUANTITIES:
-        column = logarithms[:, :, OBJECTIVE_NAMES.index(quantity.objective)]
+        index = _COLUMNS.index(quantity.column)
+        if index >= width:
+            continue
+        column = logarithms[:, :, index]
         usable = (walked & np.isfinite(column).all(axis=0)).reshape(-1, worlds)
         by_scenario = column.reshape(2, -1, worlds)
         means = {
@@ -241,8 +254,15 @@ def comparison_in_words(
     yield f"{against}: {', but '.join(filter(None, (gained, paid)))}."
     for view in views:
         yield from _losses(view, words[view.name])
-    figures = [figure.judgement for view in views for figure in view.scenarios.values()]
-    yield _counted(Counter(figures), len(figures))
+    counts = counted(views)
+    yield _counts_in_words(counts, counts.total())
+
+
+def counted(views: Sequence[QuantityView]) -> Counter[Judgement]:
+    """Count figures by judgement: objectives in scenarios."""
+    objectives = [quantity.name for quantity in QUANTITIES if quantity.column in OBJECTIVE_NAMES]
+    figures = (view.scenarios.values() for view in views if view.name in objectives)
+    return Counter(figure.judgement for figure in chain.from_iterable(figures))
 
 
 def _losses(view: QuantityView, quantity: Quantity) -> Iterator[str]:
@@ -262,7 +282,7 @@ def _losses(view: QuantityView, quantity: Quantity) -> Iterator[str]:
     )
 
 
-def _counted(counts: Mapping[Judgement, int], total: int) -> str:
+def _counts_in_words(counts: Mapping[Judgement, int], total: int) -> str:
     if counts.get("better") == total:
         return f"Better in all {total} figures."
     texts: dict[Judgement, str] = {"better": "better", "same": "the same", "worse": "worse"}

@@ -8,11 +8,14 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import cache
+from itertools import groupby
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 from gaitswarm.errors import Interrupted
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
+from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
 from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.errors import (
@@ -23,6 +26,7 @@ from gaitswarm.services.optimizer.errors import (
 )
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.iteration import evaluations_of
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -31,7 +35,7 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.tables import EvaluationTable
-from gaitswarm.views.job import IterationView, JobView, StateView
+from gaitswarm.views.job import HistoryIterationView, IterationView, JobView, StateView
 
 if TYPE_CHECKING:
     from gaitswarm.services.runtime import EvaluatorKind
@@ -100,6 +104,14 @@ class DatabaseJobs(Jobs):
                 return
             if not stop.wait(self._poll_seconds):
                 return
+
+    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
+        """Read the designs of many iterations at once."""
+        job, iterations = self._service.job(job_id), self.iterations(job_id)
+        for columns in read_columns(self._service.store, job):
+            views = evaluation_views(evaluations_of(columns), job.spec)
+            for _, designs in groupby(views, key=attrgetter("iteration")):
+                yield HistoryIterationView(**dict(next(iterations)), evaluations=list(designs))
 
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Read every evaluation."""

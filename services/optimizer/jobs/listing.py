@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -27,6 +27,12 @@ class Page(Generic[T]):
 
     items: tuple[T, ...]
     next: str | None  # the `after` of the following page; None on the last
+
+    @classmethod
+    def of(cls, items: Sequence[T], limit: int, cursor: Callable[[T], str]) -> Page[T]:
+        """Return a page of the first items; more than the limit are known if there are more."""
+        more = len(items) > limit
+        return cls(tuple(items[:limit]), cursor(items[limit - 1]) if more else None)
 
 
 def every(page_after: Callable[[str | None], Page[T]]) -> Iterator[T]:

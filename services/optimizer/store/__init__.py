@@ -78,15 +78,8 @@ class Store(Jobs, Leases, History, Recordings, Audit):
 def open_store(url: str, *, clock: Clock = database_time) -> Store:
     """Open a database of the newest schema; create an SQLite file, or tables in an empty database.
 
-    Args:
-        url: `sqlite:///path`, a bare path, or `postgresql://user:password@host/database`.
-        clock: as for `Store`.
-
-    Returns:
-        The store, to be closed by the caller.
-
-    Raises:
-        StoreUnavailable: the database cannot be used.
+    url: `sqlite:///path`, a bare path, or `postgresql://user:password@host/database`. The caller
+    closes the store. Raises StoreUnavailable if the database cannot be used.
     """
     parsed = parse_url(url)
     create(parsed)

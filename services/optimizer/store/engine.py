@@ -162,14 +162,11 @@ class Database:
     ) -> Iterator[sa.Connection]:
         """Open a transaction.
 
-        Args:
-            operation: name for observers; "" to hide the transaction from them.
-            write: whether anything is written.
-            before: called with the connection before the transaction begins.
+        Raises StoreUnavailable if the database is unreachable, or locked for `BUSY_SECONDS`, and
+        StoreReplaced, with writes rolled back, if its file was removed or replaced.
 
-        Raises:
-            StoreUnavailable: the database is unreachable, or locked for `BUSY_SECONDS`.
-            StoreReplaced: its file was removed or replaced; writes are rolled back.
+        operation: name for observers; "" to hide the transaction from them. before: called with the
+        connection before the transaction begins.
         """
         begun, failure = time.perf_counter(), None
         try:

@@ -15,14 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import (
-    ColumnElement,
-    Connection,
-    Table,
-    insert,
-    select,
-    update,
-)
+from sqlalchemy import ColumnElement, Connection, Table, insert, select, update
 
 from gaitswarm.services.optimizer.errors import Conflict, NotFound
 from gaitswarm.services.optimizer.jobs.chain import (
@@ -82,11 +75,7 @@ class History(Aggregate):
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
     ) -> Page[Iteration]:
-        """Return a page of committed iterations, in order.
-
-        Args:
-            after: return only later iterations than this index.
-        """
+        """Return a page of the committed iterations after an index, in order."""
         limit = checked_limit(limit)
         table = iterations.c
         names = ("designs", *SUMMARY, "evaluate_seconds", "committed_at", "digest")
@@ -103,18 +92,10 @@ class History(Aggregate):
         with self._database.read("iterations") as connection:
             require_job(connection, job_id)
             rows = connection.execute(query).mappings().all()
-        items = tuple(Iteration(**row) for row in rows[:limit])
-        return Page(items, str(items[-1].index) if len(rows) > limit else None)
+        return Page.of([Iteration(**row) for row in rows], limit, lambda last: str(last.index))
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Return all designs of a committed iteration, by particle.
-
-        Args:
-            iteration: index of the iteration, from 0.
-
-        Raises:
-            NotFound: no such job, or the iteration is not committed.
-        """
+        """Return all designs of an iteration, by particle. Raises NotFound if not committed."""
         found = self.evaluations_between(job_id, iteration, iteration + 1)
         if not found:
             raise NotFound(f"job {job_id} has no committed iteration {iteration}")
@@ -134,9 +115,8 @@ class History(Aggregate):
     def best(self, job_id: str) -> Evaluation | None:
         """Return the design of least fitness in double precision, the earliest of equals.
 
-        Returns:
-            The evaluation, with its reevaluation if the job searches in single precision; None if
-            every design has failed.
+        With its reevaluation if the job searches in single precision. None if every design has
+        failed.
         """
         with self._database.read("best") as connection:
             require_job(connection, job_id)
@@ -152,21 +132,15 @@ class History(Aggregate):
     def reevaluations(
         self, job_id: str, first: int = 0, last: int = _LARGEST_INDEX
     ) -> tuple[tuple[int, Reevaluation], ...]:
-        """Return the reevaluations in double precision of a range of iterations.
-
-        Returns:
-            Index of the iteration and its reevaluation, in order; empty for a job that searches in
-            double precision.
-        """
+        """Return the reevaluations of a range of iterations, each after its iteration's index."""
         with self._database.read("reevaluations") as connection:
             require_job(connection, job_id)
             return _select_reevaluations(connection, job_id, first, last)
 
     def known(self, keys: Sequence[bytes]) -> dict[bytes, Outcome]:
-        """Return the outcomes of designs that any job has simulated, by key; a row for each case.
+        """Return the outcomes of designs that any job has simulated; a row for each case.
 
-        Args:
-            keys: from `walk_keys`.
+        keys: from `walk_keys`.
         """
         table, outcomes = evaluations.c, dict[bytes, Outcome]()
         columns = (table.walk_key, table.objectives, table.statuses)
@@ -188,8 +162,7 @@ class History(Aggregate):
     def links(self, job_id: str, first: int, last: int) -> tuple[Link, ...]:
         """Return a range of iterations, including the current one, without evaluations.
 
-        Raises:
-            ValueError: one is damaged.
+        Raises ValueError for a damaged one.
         """
         with self._database.read("links") as connection:
             return _select_links(connection, job_id, first, last)
@@ -329,13 +302,10 @@ def insert_ask(
 def complete_iteration(
     connection: Connection, job: Row, done: CompletedIteration, now: datetime
 ) -> dict[str, Any]:
-    """Store the results of the open ask. Raises Conflict if not asked.
+    """Store the results of the open ask; return changed columns of the job. Raises Conflict.
 
     Clears the optimizer's state of the iteration before: a job continues from its open ask or, if
     extended, from its last committed one, and states may grow with every iteration.
-
-    Returns:
-        Changed columns of the job's row.
     """
     asked = select(iterations.c.designs, iterations.c.positions, iterations.c.ask_digest)
     open_iteration = _at(job["id"], done.iteration) & iterations.c.committed_at.is_(None)

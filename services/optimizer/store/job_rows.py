@@ -22,12 +22,7 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress, Unrea
 from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.jobs.reference import Reference
-from gaitswarm.services.optimizer.store.tables import (
-    EXISTING,
-    Row,
-    jobs,
-    notifications,
-)
+from gaitswarm.services.optimizer.store.tables import EXISTING, Row, jobs, notifications
 from gaitswarm.sim.input import message_of
 
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"

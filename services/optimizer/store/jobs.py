@@ -11,24 +11,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
-from sqlalchemy import (
-    ColumnElement,
-    Connection,
-    Double,
-    Select,
-    Table,
-    and_,
-    case,
-    delete,
-    exists,
-    false,
-    func,
-    insert,
-    literal,
-    select,
-    tuple_,
-    update,
-)
+import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import (
@@ -40,7 +23,7 @@ from gaitswarm.services.optimizer.errors import (
 from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from gaitswarm.services.optimizer.jobs.documents import check_budget
 from gaitswarm.services.optimizer.jobs.estimate import time_left
-from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage
+from gaitswarm.services.optimizer.jobs.fork import Fork
 from gaitswarm.services.optimizer.jobs.job import (
     DELETABLE,
     ENDED,
@@ -108,9 +91,9 @@ _EVALUATIONS_AT_ONCE: Final = 5000
 
 _STEADY: Final = timedelta(days=1)
 
-_DELETED: Final = select(jobs.c.id).where(jobs.c.deleted_at.is_not(None)).limit(1)
+_DELETED: Final = sa.select(jobs.c.id).where(jobs.c.deleted_at.is_not(None)).limit(1)
 
-_OF_JOBS: Final[tuple[Table, ...]] = tuple(
+_OF_JOBS: Final[tuple[sa.Table, ...]] = tuple(
     table
     for table in reversed(metadata.sorted_tables)
     if "job_id" in table.c and (table.foreign_keys or table is notifications)
@@ -135,23 +118,17 @@ class Jobs(Aggregate):
         quota: Quota | None = None,
         priority: int = 0,
     ) -> tuple[Job, bool]:
-        """Insert a queued job, or return the one that the same key created before.
+        """Insert a queued job, or return the one that the same key created before; and whether new.
+
+        A repeated request with a key creates no second job, even if presets or defaults have
+        changed in between. Raises Conflict if the parent of a fork is gone, InvalidRequest for an
+        invalid key, and IdempotencyConflict for one that was used for another request.
 
         Args:
-            idempotency_key: a repeated request with it creates no second job, even if presets or
-                defaults have changed in between.
             request: JSON document of the request as sent; None for the fields set in the spec.
             fork: origin of a forked job, whose history is copied.
             owner: name of the token of the request.
             notify_url: checked URL that is notified of the job's end.
-
-        Returns:
-            The job, and whether it is new.
-
-        Raises:
-            Conflict: the parent of a fork is gone.
-            InvalidRequest: the key is empty, too long or not printable.
-            IdempotencyConflict: the key was used for another request.
         """
         key, digest = idempotency_key, None
         if key is not None:
@@ -164,10 +141,9 @@ class Jobs(Aggregate):
             canonical = json.dumps(sent, sort_keys=True, separators=(",", ":"))
             digest = hashlib.sha256(canonical.encode()).hexdigest()
         spec = spec.resolved()
-        lineage = None if fork is None else fork.lineage
         try:
             with self._database.write("create_job") as connection:
-                earlier = _repeated_job(connection, key, digest, spec, lineage)
+                earlier = _repeated_job(connection, key, digest, spec, fork)
                 if earlier is not None:
                     return earlier, False
                 check_quota(connection, owner, quota, new_jobs=1, new_seconds=seconds or 0.0)
@@ -184,7 +160,7 @@ class Jobs(Aggregate):
         except IntegrityError:
             # Another process has inserted the same key meanwhile.
             with self._database.read("create_job") as connection:
-                earlier = _repeated_job(connection, key, digest, spec, lineage)
+                earlier = _repeated_job(connection, key, digest, spec, fork)
             if earlier is None:
                 raise
             return earlier, False
@@ -204,31 +180,32 @@ class Jobs(Aggregate):
             return take_job(connection, row, runner, lease_seconds, row["created_at"])
 
     def _insert(
-        self, connection: Connection, spec: Spec, columns: Row, fork: Fork | None = None
+        self, connection: sa.Connection, spec: Spec, columns: Row, fork: Fork | None = None
     ) -> Row:
-        now, job_id = self._clock(connection), new_job_id()
-        lineage = None if fork is None else fork.lineage
-        taken = None if fork is None else fork.taken
-        if lineage is not None and taken is not None:
-            try:
-                # It must not be deleted while it is copied.
-                job_row(connection, lineage.parent, lock=True)
-            except NotFound as error:
-                raise Conflict(f"job {lineage.parent} that was to be forked was deleted") from error
-        document = spec.model_dump(mode="json")
+        now, job_id, document = self._clock(connection), new_job_id(), spec.model_dump(mode="json")
+        action, details = AuditAction.SUBMIT, dict[str, Any]()
+        if fork is not None:
+            lineage, parent = fork.lineage, fork.lineage.parent
+            if fork.taken is not None:
+                try:
+                    # It must not be deleted while it is copied.
+                    job_row(connection, parent, lock=True)
+                except NotFound as error:
+                    raise Conflict(f"job {parent} that was to be forked was deleted") from error
+            columns = {
+                **columns,
+                "parent_id": parent,
+                "lineage": lineage.model_dump(mode="json"),
+                "evaluations_taken": lineage.evaluations,
+            }
+            action = AuditAction.FORK
+            details = {"parent": parent, "from_iteration": lineage.from_iteration}
         values = {
             "id": job_id,
             "state": JobState.QUEUED,
             "spec": document,
-            "parent_id": None if lineage is None else lineage.parent,
-            "lineage": None if lineage is None else lineage.model_dump(mode="json"),
             "created_at": now,
             "updated_at": now,
-            "lease_token": 0,
-            "iterations": 0,
-            "evaluations": 0,
-            "compute_seconds": 0.0,
-            "evaluations_taken": 0 if lineage is None else lineage.evaluations,
             "kind": document["kind"],
             "robot": robot_name(spec.robot),
             "controller": getattr(spec, "controller", None),
@@ -236,15 +213,12 @@ class Jobs(Aggregate):
             **_search_columns(job_id, spec.name, Labels()),
             **columns,
         }
-        statement = insert(jobs).values(values).returning(*COLUMNS)
+        statement = sa.insert(jobs).values(values).returning(*COLUMNS)
         row: Row = connection.execute(statement).mappings().one()
-        action, details = AuditAction.SUBMIT, {}
-        if lineage is not None:
-            action = AuditAction.FORK
-            details = {"parent": lineage.parent, "from_iteration": lineage.from_iteration}
         note_change(connection, now, row["owner"] or LOCAL, action, job_id, **details)
-        if lineage is not None and taken is not None:
-            row = update_job(connection, row, take_history(connection, row, lineage, taken, now))
+        if fork is not None and fork.taken is not None:
+            history = take_history(connection, row, fork.lineage, fork.taken, now)
+            row = update_job(connection, row, history)
         return row
 
     def job(self, job_id: str) -> Job:
@@ -264,21 +238,16 @@ class Jobs(Aggregate):
         """Apply a user's command and return the changed job; see `commanded`.
 
         A job whose lease has expired is paused at once, and queued if resumed. Cancelling clears
-        the lease, so the runner's next write is refused.
+        the lease, so the runner's next write is refused. Raises Conflict if the state does not
+        allow the command, and Unreadable if an unreadable job would be queued.
 
-        Args:
-            command: to apply.
-            accept_changes: whether a resumed job may continue under a changed provenance.
-            quota: of the owner's unfinished jobs, if an ended job is queued again.
-
-        Raises:
-            Conflict: its state does not allow the command.
-            Unreadable: it would be queued, but is unreadable.
+        accept_changes: whether a resumed job may continue under a changed provenance. quota: of the
+        owner's unfinished jobs, if an ended job is queued again.
         """
         with self._database.write("command") as connection:
             row, now = job_row(connection, job_id, lock=True), self._clock(connection)
             before = JobState(row["state"])
-            leased = select(jobs.c.id).where(jobs.c.id == job_id, has_live_lease(now))
+            leased = sa.select(jobs.c.id).where(jobs.c.id == job_id, has_live_lease(now))
             under_way = before in (JobState.RUNNING, JobState.PAUSING)
             abandoned = under_way and connection.execute(leased).first() is None
             if abandoned and command is Command.RESUME:
@@ -314,18 +283,11 @@ class Jobs(Aggregate):
         seconds: float | None = None,
         quota: Quota | None = None,
     ) -> Job:
-        """Change a job's budget; see `extended`.
+        """Change a job's budget and return it, queued if it had succeeded; see `extended`.
 
         Committed iterations and the open ask stay; later asks are made under the new budget, as
-        the runner detects it at its next commit.
-
-        Returns:
-            The changed job, queued if it had succeeded.
-
-        Raises:
-            Conflict: the job was cancelled.
-            InvalidRequest: the budget is spent already, or the job cannot have it.
-            Unreadable: the job's spec is unreadable.
+        the runner detects it at its next commit. Raises Conflict for a cancelled job,
+        InvalidRequest for a budget that is spent or impossible, and Unreadable.
         """
         with self._database.write("extend") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -344,10 +306,9 @@ class Jobs(Aggregate):
             return to_job(update_job(connection, row, changes))
 
     def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
-        """Change an unfinished job's priority, which its runner reads at the next renewal.
+        """Change a job's priority, which its runner reads at the next renewal.
 
-        Raises:
-            Conflict: the job has ended.
+        Raises Conflict for a job that has ended.
         """
         with self._database.write("prioritize") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -373,7 +334,7 @@ class Jobs(Aggregate):
 
     def note_reference(self, job_id: str, reference: Reference) -> None:
         """Store the reference of a job's best design, unless one is stored or the job is gone."""
-        unset = update(jobs).where(jobs.c.id == job_id, jobs.c.reference_kind.is_(None))
+        unset = sa.update(jobs).where(jobs.c.id == job_id, jobs.c.reference_kind.is_(None))
         columns = {f"reference_{name}": value for name, value in asdict(reference).items()}
         with self._database.write("note_reference") as connection:
             connection.execute(unset.values(columns))
@@ -390,10 +351,7 @@ class Jobs(Aggregate):
         """Delete a job with its history; forks have copies of theirs.
 
         The job is invisible, and its idempotency key free, once this returns. `purge_deleted`
-        removes its rows.
-
-        Raises:
-            Conflict: it is queued, running, pausing or kept.
+        removes its rows. Raises Conflict if it is queued, running, pausing or kept.
         """
         with self._database.write("delete_job") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -419,29 +377,24 @@ class Jobs(Aggregate):
         changed = jobs.c.updated_at
         with self._database.read("clock_jump") as connection:
             now = self._clock(connection)
-            before = connection.execute(
-                select(func.max(changed)).where(changed <= now - _STEADY)
-            ).scalar()
+            before = connection.scalar(
+                sa.select(sa.func.max(changed)).where(changed <= now - _STEADY)
+            )
             if before is None:
                 return None
-            after = connection.execute(select(func.min(changed)).where(changed > before)).scalar()
+            after = connection.scalar(sa.select(sa.func.min(changed)).where(changed > before))
         jump: timedelta = (after or now) - before
         return jump if jump > _STEADY else None
 
     def delete_ended_before(
         self, moment: datetime, states: Collection[JobState] = ENDED
     ) -> tuple[str, ...]:
-        """Delete jobs as `delete_job` does, except kept ones and parents of unfinished forks.
+        """Delete jobs that ended before an aware time in some states, and return their ids.
 
-        Args:
-            moment: aware time before which they ended.
-            states: in which they ended.
-
-        Returns:
-            Their ids.
+        As `delete_job`, except kept ones and parents of unfinished forks.
         """
         fork = jobs.alias("fork")
-        unfinished_fork = exists().where(
+        unfinished_fork = sa.exists().where(
             fork.c.parent_id == jobs.c.id, fork.c.state.not_in(ENDED), fork.c.deleted_at.is_(None)
         )
         expired = (
@@ -457,13 +410,11 @@ class Jobs(Aggregate):
     def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
         """Remove rows of deleted jobs in short transactions, using half of the time.
 
-        Several processes may do so at once.
-
-        Args:
-            should_stop: called between transactions; if true, the rest is left to a later call.
+        Several processes may do so at once. `should_stop` is called between transactions; if true,
+        the rest is left to a later call.
         """
         with self._database.read("purge_deleted") as connection:
-            more = connection.execute(_DELETED).first() is not None
+            more = connection.scalar(_DELETED) is not None
         while more and not should_stop():
             begun = time.monotonic()
             with self._database.write("purge_deleted") as connection:
@@ -487,15 +438,9 @@ class Jobs(Aggregate):
         """Return a page of jobs. Jobs submitted meanwhile do not shift later pages.
 
         Args:
-            state: only jobs in this state.
-            kind: only jobs of this kind.
+            state, kind, where: only jobs in a state, of a kind, and that meet further criteria.
             parent: only forks of the job of this id.
-            where: further criteria.
             order: sort order; jobs without a value are last, also in the reverse order.
-            reverse: whether to reverse the order.
-
-        Raises:
-            InvalidRequest: the cursor is invalid or of another order, or the limit less than 1.
         """
         limit = checked_limit(limit)
         cursor = f"-{order}" if reverse else str(order)
@@ -505,7 +450,7 @@ class Jobs(Aggregate):
         if state is not None:
             conditions.append(jobs.c.state == state)
         if parent is not None:
-            conditions.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
+            conditions.append(jobs.c.parent_id == parent if is_job_id(parent) else sa.false())
         if search:
             conditions.append(jobs.c.search_text.contains(folded(search), autoescape=True))
         if kind is not None:
@@ -516,20 +461,18 @@ class Jobs(Aggregate):
             descending = reverse is not (order is JobOrder.CREATED)
             for ids, place in _pages(conditions, key, last, descending):
                 # Only ids are sorted and filtered: specs may be large.
-                page = ids.limit(limit + 1 - len(rows))
-                shown = select(*COLUMNS, key.label("sort_key")).where(jobs.c.id.in_(page))
+                some = jobs.c.id.in_(ids.limit(limit + 1 - len(rows)))
+                shown = sa.select(*COLUMNS, key.label("sort_key")).where(some)
                 rows += connection.execute(shown.order_by(*place)).mappings()
                 if len(rows) > limit:
                     break
-        items = tuple(map(to_job, rows[:limit]))
-        if len(rows) <= limit:
-            return Page(items, None)
-        return Page(items, to_cursor(cursor, rows[limit - 1]["sort_key"], items[-1].id))
+        page = Page.of(rows, limit, lambda row: to_cursor(cursor, row["sort_key"], row["id"]))
+        return Page(tuple(map(to_job, page.items)), page.next)
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by facet."""
         names = ("state", "robot", "controller", "preference")
-        query = select(*(jobs.c[name] for name in names), jobs.c.tags)
+        query = sa.select(*(jobs.c[name] for name in names), jobs.c.tags)
         with self._database.read("facets") as connection:
             rows = connection.execute(query.where(*_conditions(JobFilter(archived=archived)))).all()
         states, robots, controllers, preferences = (
@@ -542,35 +485,38 @@ class Jobs(Aggregate):
         """Count jobs by state and kind. Ended jobs are not read, as there may be very many."""
         with self._database.read("queue") as connection:
             now = self._clock(connection)
-            numbers = select(jobs.c.state, func.count()).where(EXISTING).group_by(jobs.c.state)
+            numbers = (
+                sa.select(jobs.c.state, sa.func.count()).where(EXISTING).group_by(jobs.c.state)
+            )
             by_state = dict.fromkeys(JobState, 0)
             by_state |= {JobState(state): count for state, count in connection.execute(numbers)}
             state_and_kind = (jobs.c.state, jobs.c.kind)
-            unfinished = select(*state_and_kind, func.count()).group_by(*state_and_kind)
+            unfinished = sa.select(*state_and_kind, sa.func.count()).group_by(*state_and_kind)
             query = unfinished.where(jobs.c.state.not_in(ENDED), EXISTING)
             under_way = {
                 (JobState(state), kind): count for state, kind, count in connection.execute(query)
             }
             queued = (jobs.c.state == JobState.QUEUED, EXISTING)
-            since = connection.execute(select(func.min(jobs.c.updated_at)).where(*queued)).scalar()
-            beginning = func.substr(func.coalesce(jobs.c.error, ""), 1, _ERROR_LENGTH)
-            failed = select(beginning).where(jobs.c.state == JobState.FAILED, EXISTING)
+            since = connection.scalar(sa.select(sa.func.min(jobs.c.updated_at)).where(*queued))
+            beginning = sa.func.substr(sa.func.coalesce(jobs.c.error, ""), 1, _ERROR_LENGTH)
+            failed = sa.select(beginning).where(jobs.c.state == JobState.FAILED, EXISTING)
             errors = tuple(connection.execute(failed).scalars())
         wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
         return Queue(by_state, under_way, wait, errors)
 
 
 def _repeated_job(
-    connection: Connection, key: str | None, digest: str | None, spec: Spec, lineage: Lineage | None
+    connection: sa.Connection, key: str | None, digest: str | None, spec: Spec, fork: Fork | None
 ) -> Job | None:
     """Return the job that the same key created. Raises IdempotencyConflict for another request."""
-    query = select(*COLUMNS).where(jobs.c.idempotency_key == key)
+    query = sa.select(*COLUMNS).where(jobs.c.idempotency_key == key)
     row = None if key is None else connection.execute(query).mappings().first()
     if row is None:
         return None
     job, submitted = to_job(row), to_job({**row, "budget": None}).stored_spec
     # Equal requests resolve to unequal specs if presets have changed since; a request in other
     # words is the same if its spec is.
+    lineage = None if fork is None else fork.lineage
     if row["request_digest"] == digest or (submitted == spec and job.lineage == lineage):
         return job
     what = "the different job" if job.readable else "a job that cannot be read and compared,"
@@ -590,40 +536,40 @@ def _search_columns(job_id: str, spec_name: str, labels: Labels) -> dict[str, An
 
 
 def _mark_deleted(
-    connection: Connection, which: Sequence[ColumnElement[bool]], now: datetime, actor: str
+    connection: sa.Connection, which: Sequence[sa.ColumnElement[bool]], now: datetime, actor: str
 ) -> tuple[str, ...]:
     gone = {"deleted_at": now, "idempotency_key": None, "request_digest": None}
-    marked = update(jobs).where(*which).values(**gone).returning(jobs.c.id)
+    marked = sa.update(jobs).where(*which).values(**gone).returning(jobs.c.id)
     ids = tuple(connection.execute(marked).scalars())
     for job_id in ids:
         note_change(connection, now, actor, AuditAction.DELETE, job_id)
     return ids
 
 
-def _remove_rows(connection: Connection) -> bool:
+def _remove_rows(connection: sa.Connection) -> bool:
     """Remove some iterations of a deleted job, or its last rows. Returns whether there was one."""
-    job_id = connection.execute(_DELETED.with_for_update(skip_locked=True)).scalar()
+    job_id = connection.scalar(_DELETED.with_for_update(skip_locked=True))
     if job_id is None:
         return False
     place, of_job = evaluations.c.iteration, evaluations.c.job_id == job_id
-    first = connection.execute(select(func.min(place)).where(of_job)).scalar()
+    first = connection.scalar(sa.select(sa.func.min(place)).where(of_job))
     end: int | None = None
     if first is not None:
-        count = select(func.count()).where(of_job, place == first)
+        count = sa.select(sa.func.count()).where(of_job, place == first)
         end = first + max(1, _EVALUATIONS_AT_ONCE // connection.execute(count).scalar_one())
     for table in _OF_JOBS:
-        rows = delete(table).where(table.c.job_id == job_id)
+        rows = sa.delete(table).where(table.c.job_id == job_id)
         if end is None:
             connection.execute(rows)
         elif "iteration" in table.c:
             connection.execute(rows.where(table.c.iteration < end))
     if end is None:
-        connection.execute(delete(jobs).where(jobs.c.id == job_id))
+        connection.execute(sa.delete(jobs).where(jobs.c.id == job_id))
     return True
 
 
-def _conditions(where: JobFilter) -> list[ColumnElement[bool]]:
-    conditions: list[ColumnElement[bool]] = [EXISTING]
+def _conditions(where: JobFilter) -> list[sa.ColumnElement[bool]]:
+    conditions: list[sa.ColumnElement[bool]] = [EXISTING]
     if where.archived is not None:
         conditions.append(jobs.c.archived.is_(where.archived))
     if where.robot == OWN:
@@ -636,25 +582,25 @@ def _conditions(where: JobFilter) -> list[ColumnElement[bool]]:
         conditions.append(jobs.c.preference == storable(where.preference))
     if where.tag is not None:
         # Unlike LIKE, this tells capital letters apart in both databases.
-        without = func.replace(jobs.c.tags, f"\n{storable(where.tag)}\n", "")
+        without = sa.func.replace(jobs.c.tags, f"\n{storable(where.tag)}\n", "")
         conditions.append(without != jobs.c.tags)
     return conditions
 
 
 def _pages(
-    conditions: list[ColumnElement[bool]],
-    key: ColumnElement[Any],
+    conditions: list[sa.ColumnElement[bool]],
+    key: sa.ColumnElement[Any],
     last: tuple[Any, str] | None,
     descending: bool,
-) -> Iterator[tuple[Select[Any], list[ColumnElement[Any]]]]:
+) -> Iterator[tuple[sa.Select[Any], list[sa.ColumnElement[Any]]]]:
     """Yield ids after the last job and their order: jobs with a sort value, then the others."""
-    ids = select(jobs.c.id).where(*conditions)
+    ids = sa.select(jobs.c.id).where(*conditions)
     if last is None or last[0] is not None:
         place = [key, jobs.c.id]
         valued = ids.where(key.is_not(None))
         if last is not None:
-            value = literal(last[0], Double if isinstance(last[0], float) else None)
-            end, here = tuple_(value, literal(last[1])), tuple_(*place)
+            value = sa.literal(last[0], sa.Double if isinstance(last[0], float) else None)
+            end, here = sa.tuple_(value, sa.literal(last[1])), sa.tuple_(*place)
             valued = valued.where(here < end if descending else here > end)
         order = [column.desc() if descending else column for column in place]
         yield valued.order_by(*order), order
@@ -665,20 +611,20 @@ def _pages(
         yield unvalued, [jobs.c.id]
 
 
-def _key(connection: Connection, order: JobOrder) -> ColumnElement[Any]:
+def _key(connection: sa.Connection, order: JobOrder) -> sa.ColumnElement[Any]:
     """Return the value to sort by; NULL if a job has none."""
     if order is JobOrder.TIME_LEFT:
         return _time_left(connection)
     if order is JobOrder.GAIN:
         # The negative of `Job.gain`.
         reference = jobs.c.reference_fitness
-        return jobs.c.best_fitness / case((reference > 0.0, reference)) - 1.0
+        return jobs.c.best_fitness / sa.case((reference > 0.0, reference)) - 1.0
     if order is JobOrder.RATE:
         own, seconds = jobs.c.evaluations - jobs.c.evaluations_taken, jobs.c.compute_seconds
-        return -case((and_(own > 0, seconds > 0.0), own / case((seconds > 0.0, seconds))))
+        return -sa.case((sa.and_(own > 0, seconds > 0.0), own / sa.case((seconds > 0.0, seconds))))
     if order is JobOrder.STATE:
-        return case({str(state): k for k, state in enumerate(JobState)}, value=jobs.c.state)
-    keys: dict[JobOrder, ColumnElement[Any]] = {
+        return sa.case({str(state): k for k, state in enumerate(JobState)}, value=jobs.c.state)
+    keys: dict[JobOrder, sa.ColumnElement[Any]] = {
         JobOrder.CREATED: jobs.c.created_at,
         JobOrder.FITNESS: jobs.c.best_fitness,
         JobOrder.NAME: jobs.c.sort_name,
@@ -689,11 +635,15 @@ def _key(connection: Connection, order: JobOrder) -> ColumnElement[Any]:
     return keys[order]
 
 
-def _time_left(connection: Connection) -> ColumnElement[Any]:
+def _time_left(connection: sa.Connection) -> sa.ColumnElement[Any]:
     """Return the estimates of the few running jobs; they depend on the time."""
-    running = select(*COLUMNS).where(EXISTING, jobs.c.state == JobState.RUNNING)
+    running = sa.select(*COLUMNS).where(EXISTING, jobs.c.state == JobState.RUNNING)
     now = datetime.now(UTC)
     shown = map(to_job, connection.execute(running).mappings())
     times = {job.id: time_left(job, now).eta_seconds for job in shown}
-    known = {job_id: literal(s, Double) for job_id, s in times.items() if s is not None}
-    return case(known, value=jobs.c.id) if known else func.nullif(literal(0.0, Double), 0.0)
+    known = {job_id: sa.literal(s, sa.Double) for job_id, s in times.items() if s is not None}
+    return (
+        sa.case(known, value=jobs.c.id)
+        if known
+        else sa.func.nullif(sa.literal(0.0, sa.Double), 0.0)
+    )

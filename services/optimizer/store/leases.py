@@ -68,14 +68,10 @@ class Leases(Aggregate):
         job is running, under a token higher than any before. A pausing job without a lease becomes
         paused, an unreadable one fails, and so does one whose runners have crashed too often; none
         of them keeps others from being claimed. A lease that expires without release counts as a
-        crash until the next commit or resumption.
+        crash until the next commit or resumption. Returns None if there is no job to claim.
 
-        Args:
-            job_id: the only job to claim; None for any.
-            quarantine_after: consecutive crashes after which a job fails.
-
-        Returns:
-            The claim; None if there is no job to claim.
+        job_id: the only job to claim; None for any. quarantine_after: consecutive crashes after
+        which a job fails.
         """
         claim = None
         with self._database.write("claim") as connection:
@@ -109,13 +105,9 @@ class Leases(Aggregate):
         return claim
 
     def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> Renewal:
-        """Prolong a lease.
+        """Prolong a lease; return the job's state and priority, which users may have changed.
 
-        Args:
-            waiting: reason for waiting, shown to users; None if the job does not wait.
-
-        Returns:
-            The job's state and priority, which users may have changed.
+        waiting: reason for waiting, shown to users; None if the job does not wait.
         """
         with self._held("renew", claim) as (connection, row):
             changes: dict[str, Any] = _lease(self._clock(connection), lease_seconds)
@@ -141,12 +133,8 @@ class Leases(Aggregate):
     def begin(self, claim: Claim, ask: Ask) -> None:
         """Store the ask of a new job, or of one that continues after an extension. Idempotent.
 
-        Args:
-            ask: designs to evaluate next.
-
-        Raises:
-            BudgetChanged: the job's budget is not the claim's, on which the ask depends.
-            Conflict: the ask is not of the next iteration.
+        Raises BudgetChanged if the job's budget is not the claim's, on which the ask depends, and
+        Conflict for an ask of another than the next iteration.
         """
         with self._held("begin", claim) as (connection, row):
             if open_ask(connection, row) is None:
@@ -155,11 +143,7 @@ class Leases(Aggregate):
                 insert_ask(connection, row, ask, expected=row["iterations"], now=now)
 
     def journal(self, claim: Claim, entries: Sequence[JournalEntry]) -> None:
-        """Store outcomes of the open ask's finished tasks; later claims bring them.
-
-        Args:
-            entries: of different tasks.
-        """
+        """Store outcomes of finished tasks of the open ask; later claims bring them."""
         with self._held("journal", claim) as (connection, row):
             insert_entries(connection, row, entries)
 
@@ -173,18 +157,12 @@ class Leases(Aggregate):
     ) -> JobState:
         """Store a completed iteration and the next ask. A repeated commit changes nothing.
 
-        Args:
-            done: the iteration.
-            following: the next ask; None at the end of the budget.
-            journaled: whether to clear the journal.
+        Returns the job's state afterwards: succeeded at the end of the budget; paused, without a
+        lease, if it was pausing; otherwise unchanged. Raises BudgetChanged if the job's budget is
+        not the claim's, on which `following` depends, and Conflict if the iteration was not asked.
 
-        Returns:
-            The job's state afterwards: succeeded at the end of the budget; paused, without a
-            lease, if it was pausing; otherwise unchanged.
-
-        Raises:
-            BudgetChanged: the job's budget is not the claim's, on which `following` depends.
-            Conflict: the iteration was not asked.
+        following: the next ask; None at the end of the budget. journaled: whether to clear the
+        journal.
         """
         with self._held("commit", claim, committed=done.iteration) as (connection, row):
             if done.iteration < row["iterations"]:
@@ -207,11 +185,9 @@ class Leases(Aggregate):
         return state
 
     def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        """Give up a lease.
+        """Give up a lease; the job fails by an error, or is paused or queued.
 
-        Args:
-            state: failed, paused, or queued; a pausing job becomes paused instead of queued.
-            error: why it failed.
+        A pausing job becomes paused instead of queued.
         """
         if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
             raise ValueError(f"a runner cannot release a job as {state}")

@@ -13,27 +13,12 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Final
 
-from sqlalchemy import (
-    JSON,
-    URL,
-    Connection,
-    Text,
-    bindparam,
-    cast,
-    delete,
-    func,
-    insert,
-    select,
-)
+from sqlalchemy import JSON, URL, Connection, Text, bindparam, cast, delete, func, insert, select
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.optimizer.store.engine import (
-    Database,
-    database_time,
-    parse_url,
-)
+from gaitswarm.services.optimizer.store.engine import Database, database_time, parse_url
 from gaitswarm.services.optimizer.store.schema import (
     check_revision,
     create,
@@ -41,11 +26,7 @@ from gaitswarm.services.optimizer.store.schema import (
     lock_file,
     upgrade,
 )
-from gaitswarm.services.optimizer.store.tables import (
-    jobs,
-    metadata,
-    recordings,
-)
+from gaitswarm.services.optimizer.store.tables import jobs, metadata, recordings
 
 _ROWS_AT_ONCE: Final = 1000
 
@@ -61,10 +42,8 @@ _RECORDING_ID: Final = re.compile(r"\b[0-9a-f]{32}\b")
 def backup(url: str, file: Path, *, overwrite: bool = False) -> None:
     """Write a snapshot of an SQLite database, which may be in use, to a file.
 
-    Raises:
-        InvalidRequest: the database is on a server.
-        Conflict: the file exists and must not be replaced.
-        StoreUnavailable: the database cannot be read, or the file not be written.
+    Raises InvalidRequest for a database on a server, Conflict for a file that exists and must not
+    be replaced, and StoreUnavailable.
     """
     if file.exists() and not overwrite:
         raise Conflict(f"{file} exists already; name another file, or replace it with --force")
@@ -79,11 +58,9 @@ def backup(url: str, file: Path, *, overwrite: bool = False) -> None:
 def restore(url: str, file: Path, *, overwrite: bool = False) -> None:
     """Fill an unused database from a backup of this or an older version, in the newest schema.
 
-    Raises:
-        NotFound: no such file.
-        InvalidRequest: the file is not a backup.
-        Conflict: the database is in use, or holds data that must not be replaced.
-        StoreUnavailable: the database cannot be written, or a newer gaitswarm made the backup.
+    Raises NotFound, InvalidRequest for a file that is no backup, Conflict if the database is in use
+    or holds data that must not be replaced, and StoreUnavailable if it cannot be written, or a
+    newer gaitswarm made the backup.
     """
     if not file.is_file():
         raise NotFound(f"there is no backup {file}")
@@ -225,11 +202,9 @@ def prune(
 ) -> Pruned:
     """Remove old jobs, as `Store.delete_ended_before`, old audit entries and unused recordings.
 
-    Free space is returned to the file system. An age of None removes none of its kind.
-
-    Raises:
-        Conflict: the clock has jumped, and is not trusted, so that ages may be wrong.
-        StoreUnavailable: the database cannot be written or lacks the newest schema.
+    Free space is returned to the file system. An age of None removes none of its kind. Raises
+    Conflict if the clock has jumped, and is not trusted, so that ages may be wrong, and
+    StoreUnavailable if the database cannot be written or lacks the newest schema.
     """
     with closing(Database(url, for_migration=True)) as database:
         check_revision(database)

@@ -6,11 +6,7 @@ from datetime import timedelta
 
 from sqlalchemy import or_, select, update
 
-from gaitswarm.services.optimizer.jobs.notification import (
-    LONGEST_PAUSE,
-    Notification,
-    pause_after,
-)
+from gaitswarm.services.optimizer.jobs.notification import LONGEST_PAUSE, Notification, pause_after
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import require_job
 from gaitswarm.services.optimizer.store.tables import Row, notifications
@@ -20,13 +16,9 @@ class Outbox(Aggregate):
     """Notifications; the transaction that ends a job with a URL adds one."""
 
     def take(self, *, lease_seconds: float) -> Notification | None:
-        """Lease the notification that has been due for longest, for one attempt.
+        """Lease the notification that has been due for longest, for one attempt; None if none is.
 
-        Args:
-            lease_seconds: time after which it is due again [s].
-
-        Returns:
-            The notification; None if none is due.
+        lease_seconds: time after which it is due again [s].
         """
         due = notifications.c.next_attempt_at
         longest = timedelta(seconds=max(LONGEST_PAUSE, lease_seconds))
@@ -51,12 +43,9 @@ class Outbox(Aggregate):
             return _notification(row)
 
     def settle(self, taken: Notification, error: str | None, *, final: bool = False) -> None:
-        """Record the result of an attempt: delivered, due again later, or given up.
+        """Record the result of an attempt: delivered without an error, due later, or given up.
 
-        Args:
-            taken: from `take`.
-            error: why it failed; None if it was delivered.
-            final: whether to give up now.
+        final: whether to give up now.
         """
         attempts = taken.attempts + 1
         pause = None if final or error is None else pause_after(attempts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import fields
 from datetime import datetime
 
@@ -33,51 +34,35 @@ class Recordings(Aggregate):
     """Recorded walks."""
 
     def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
-        """Store a recorded walk, once.
-
-        Args:
-            walk: to store.
-            actor: for the audit log, if the walk is new.
-
-        Returns:
-            Its id, a digest of its content.
-        """
+        """Store a recorded walk, once, and return its id, a digest of its content."""
         text = walk.model_dump_json()
         recording = hashlib.sha256(text.encode()).hexdigest()[:32]
         stored = select(recordings.c.id).where(recordings.c.id == recording)
-        try:
-            with self._database.write("add_recording") as connection:
-                if connection.execute(stored).first() is None:
-                    now, document = self._clock(connection), walk.model_dump(mode="json")
-                    connection.execute(
-                        insert(recordings).values(
-                            id=recording,
-                            document=document,
-                            created_at=now,
-                            size=len(text),
-                            scenario=walk.scenario.name,
-                            controller=walk.controller,
-                            joints=len(walk.joints),
-                            rows=len(walk.current),
-                            synthetic=walk.synthetic,
-                        )
+        # Another process may store the same walk meanwhile.
+        with suppress(IntegrityError), self._database.write("add_recording") as connection:
+            if connection.execute(stored).first() is None:
+                now, document = self._clock(connection), walk.model_dump(mode="json")
+                connection.execute(
+                    insert(recordings).values(
+                        id=recording,
+                        document=document,
+                        created_at=now,
+                        size=len(text),
+                        scenario=walk.scenario.name,
+                        controller=walk.controller,
+                        joints=len(walk.joints),
+                        rows=len(walk.current),
+                        synthetic=walk.synthetic,
                     )
-                    action = AuditAction.ADD_RECORDING
-                    note_change(connection, now, actor, action, recording=recording)
-        except IntegrityError:
-            # Another process has stored the same walk meanwhile.
-            pass
+                )
+                action = AuditAction.ADD_RECORDING
+                note_change(connection, now, actor, action, recording=recording)
         return recording
 
     def recordings(self, ids: Sequence[str]) -> Walks:
         """Return recorded walks by id.
 
-        Args:
-            ids: of the walks.
-
-        Raises:
-            NotFound: no such recording; names the first.
-            Unreadable: one was stored by another version, or is damaged.
+        Raises NotFound, which names the first, and Unreadable for a damaged or later one.
         """
         with self._database.read("recordings") as connection:
             return load_recordings(connection, ids)
@@ -98,10 +83,8 @@ class Recordings(Aggregate):
             query = query.where(func.lower(words).contains(folded(search), autoescape=True))
         with self._database.read("recording_list") as connection:
             rows = connection.execute(query.limit(limit + 1)).mappings().all()
-        items = tuple(RecordingEntry(**row) for row in rows[:limit])
-        if len(rows) <= limit:
-            return Page(items, None)
-        return Page(items, to_cursor("recording", items[-1].created_at, items[-1].id))
+        entries = [RecordingEntry(**row) for row in rows]
+        return Page.of(entries, limit, lambda e: to_cursor("recording", e.created_at, e.id))
 
 
 def load_recordings(connection: Connection, ids: Sequence[str]) -> Walks:

@@ -14,11 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import DBAPIError
 
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
-from gaitswarm.services.optimizer.store.engine import (
-    Database,
-    database_time,
-    parse_url,
-)
+from gaitswarm.services.optimizer.store.engine import Database, database_time, parse_url
 from gaitswarm.services.optimizer.store.leases import has_live_lease
 from gaitswarm.services.optimizer.store.tables import jobs, metadata
 
@@ -28,12 +24,6 @@ MIGRATIONS: Final = Path(__file__).with_name("migrations")
 # Numbers of advisory locks: "gaitsw" and the kind.
 _MIGRATING: Final = 0x6761_6974_7377_6D01
 _IN_USE: Final = 0x6761_6974_7377_6D02
-
-_VERSION_TABLE: Final = (
-    "CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL,"
-    " CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
-)
-"""Alembic's own table."""
 
 _alembic_lock: Final = threading.Lock()
 """Alembic keeps the migration in progress in module globals."""
@@ -119,20 +109,15 @@ def create(url: sa.URL) -> None:
                     )
                 # Migrating, and importing Alembic, takes ten times as long.
                 metadata.create_all(connection, checkfirst=False)
-                connection.exec_driver_sql(_VERSION_TABLE)
-                added = sa.text("INSERT INTO alembic_version VALUES (:head)")
-                connection.execute(added, {"head": head()})
+                version = f"CREATE TABLE alembic_version AS SELECT '{head()}' AS version_num"
+                connection.exec_driver_sql(version)
 
 
 def upgrade(url: str) -> str | None:
-    """Migrate an unused database to the newest revision.
+    """Migrate an unused database to the newest revision; return that before, None if empty.
 
-    Returns:
-        Its revision before; None if it was empty.
-
-    Raises:
-        Conflict: it is in use.
-        StoreUnavailable: it cannot be opened or migrated, or a newer gaitswarm made it.
+    Raises Conflict if it is in use, and StoreUnavailable if it cannot be opened or migrated, or a
+    newer gaitswarm made it.
     """
     parsed = parse_url(url)
     with closing(Database(parsed, for_migration=True)) as database:

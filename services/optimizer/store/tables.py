@@ -77,16 +77,16 @@ jobs: Final = sa.Table(
     sa.Column("error", sa.Text),
     # The token never decreases; the owner is NULL while no runner holds the job.
     sa.Column("lease_owner", sa.Text),
-    sa.Column("lease_token", sa.BigInteger, nullable=False),
+    sa.Column("lease_token", sa.BigInteger, nullable=False, default=0),
     sa.Column("lease_renewed_at", UtcDateTime),
     sa.Column("lease_expires_at", UtcDateTime),
     # Number of committed iterations, and index of the next.
-    sa.Column("iterations", sa.Integer, nullable=False),
-    sa.Column("evaluations", sa.BigInteger, nullable=False),
+    sa.Column("iterations", sa.Integer, nullable=False, default=0),
+    sa.Column("evaluations", sa.BigInteger, nullable=False, default=0),
     sa.Column("best_fitness", sa.Double),
     sa.Column("best_iteration", sa.Integer),
     sa.Column("best_particle", sa.Integer),
-    sa.Column("compute_seconds", sa.Double, nullable=False),
+    sa.Column("compute_seconds", sa.Double, nullable=False, default=0.0),
     # Iterations to run if the job was extended; the spec stays as submitted.
     sa.Column("budget", sa.Integer),
     # Of the request with the idempotency key; NULL without a key.
@@ -177,9 +177,7 @@ evaluations: Final = sa.Table(
     sa.Column("iteration", sa.Integer, primary_key=True),
     sa.Column("particle", sa.Integer, primary_key=True),
     # (v,) and (K, m) float64; K bytes, values of `Status`.
-    sa.Column("design", sa.LargeBinary, nullable=False),
-    sa.Column("objectives", sa.LargeBinary, nullable=False),
-    sa.Column("statuses", sa.LargeBinary, nullable=False),
+    *(sa.Column(n, sa.LargeBinary, nullable=False) for n in ("design", "objectives", "statuses")),
     sa.Column("fitness", sa.Double, nullable=False),
     # Key of the simulated design; NULL if the outcome was cached.
     sa.Column("walk_key", sa.LargeBinary, index=True),
@@ -193,8 +191,7 @@ reevaluations: Final = sa.Table(
     sa.Column("job_id", sa.Text, primary_key=True),
     sa.Column("iteration", sa.Integer, primary_key=True),
     sa.Column("particle", sa.Integer, primary_key=True),
-    sa.Column("objectives", sa.LargeBinary, nullable=False),
-    sa.Column("statuses", sa.LargeBinary, nullable=False),
+    *(sa.Column(n, sa.LargeBinary, nullable=False) for n in ("objectives", "statuses")),
     sa.Column("fitness", sa.Double, nullable=False),
     sa.ForeignKeyConstraint(
         ["job_id", "iteration", "particle"],
@@ -211,9 +208,7 @@ journal: Final = sa.Table(
     sa.Column("iteration", sa.Integer, nullable=False),
     sa.Column("case_index", sa.Integer, nullable=False),
     # n keys of designs; (n, m) float64; n bytes, values of `Status`.
-    sa.Column("keys", sa.LargeBinary, nullable=False),
-    sa.Column("objectives", sa.LargeBinary, nullable=False),
-    sa.Column("statuses", sa.LargeBinary, nullable=False),
+    *(sa.Column(n, sa.LargeBinary, nullable=False) for n in ("keys", "objectives", "statuses")),
     sa.ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
 )
 

@@ -24,18 +24,7 @@ class Tokens(Aggregate):
     """Access tokens."""
 
     def create(self, name: str, scope: Scope) -> tuple[Token, str]:
-        """Create a token.
-
-        Args:
-            name: unused so far, also by revoked tokens.
-            scope: its permissions.
-
-        Returns:
-            The token and its secret.
-
-        Raises:
-            InvalidRequest: the name is invalid or taken.
-        """
+        """Create a token and its secret. Raises InvalidRequest for an invalid or taken name."""
         if not _NAME.fullmatch(name):
             raise InvalidRequest("must be 1 to 64 letters, digits, '_', '.' and '-'", field="name")
         if name in (LOCAL, RETENTION):
@@ -54,11 +43,7 @@ class Tokens(Aggregate):
             ) from None
 
     def create_first(self) -> str | None:
-        """Create an admin token `first`, unless any token has ever been created.
-
-        Returns:
-            Its secret; None if there was a token.
-        """
+        """Create an admin token `first` and return its secret, unless there ever was a token."""
         try:
             with self._database.write("token_create_first") as connection:
                 if connection.execute(select(func.count()).select_from(tokens)).scalar_one():
@@ -75,14 +60,7 @@ class Tokens(Aggregate):
             return tuple(map(_token, connection.execute(query).mappings()))
 
     def revoke(self, name: str) -> Token:
-        """Revoke a token. Idempotent.
-
-        Args:
-            name: of the token.
-
-        Raises:
-            NotFound: no such token.
-        """
+        """Revoke a token. Idempotent. Raises NotFound."""
         with self._database.write("token_revoke") as connection:
             now = self._clock(connection)
             valid = update(tokens).where(tokens.c.name == name, tokens.c.revoked_at.is_(None))
@@ -95,11 +73,7 @@ class Tokens(Aggregate):
         return _token(row)
 
     def find(self, secret: str) -> Token | None:
-        """Return the valid token of a secret; None if there is none.
-
-        Args:
-            secret: as received.
-        """
+        """Return the valid token of a secret; None if there is none."""
         digest = tokens.c.digest == secret_digest(secret)
         query = select(tokens).where(digest, tokens.c.revoked_at.is_(None))
         with self._database.read("token_find") as connection:
@@ -124,11 +98,7 @@ class Audit(Aggregate):
     def audit(
         self, *, job_id: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[AuditEntry]:
-        """Return a page of the audit log, newest first.
-
-        Args:
-            job_id: only entries about this job, which may be deleted.
-        """
+        """Return a page of the audit log, newest first; of a job, which may be deleted, or all."""
         limit = checked_limit(limit)
         others = (column for column in audit.c if column is not audit.c.id)
         query = select(audit.c.id.label("index"), *others).order_by(audit.c.id.desc())
@@ -143,17 +113,11 @@ class Audit(Aggregate):
             query = query.where(audit.c.id < int(after))
         with self._database.read("audit") as connection:
             rows = connection.execute(query.limit(limit + 1)).mappings().all()
-        entries = tuple(
-            AuditEntry(**{**row, "action": AuditAction(row["action"])}) for row in rows[:limit]
-        )
-        return Page(entries, str(entries[-1].index) if len(rows) > limit else None)
+        entries = [AuditEntry(**{**row, "action": AuditAction(row["action"])}) for row in rows]
+        return Page.of(entries, limit, lambda last: str(last.index))
 
     def forget_audit_before(self, moment: datetime) -> int:
-        """Remove old entries, and return their number.
-
-        Args:
-            moment: aware time before which they were added.
-        """
+        """Remove entries added before an aware time, and return their number."""
         with self._database.write("forget_audit_before") as connection:
             return connection.execute(delete(audit).where(audit.c.at < moment)).rowcount
 

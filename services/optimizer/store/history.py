@@ -6,6 +6,7 @@ Floats keep every bit, except that objectives that are not finite are stored as 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -270,15 +271,7 @@ def _at(job_id: str, iteration: int) -> ColumnElement[bool]:
     return (iterations.c.job_id == job_id) & (iterations.c.iteration == iteration)
 
 
-def insert_ask(
-    connection: Connection,
-    job: Row,
-    ask: Ask,
-    *,
-    expected: int,
-    now: datetime,
-    digest: str | None = None,
-) -> None:
+def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:
     """Store an ask before it is evaluated. Raises Conflict for another than the next iteration."""
     if ask.iteration != expected:
         raise Conflict(
@@ -286,17 +279,20 @@ def insert_ask(
         )
     if not np.isfinite(ask.positions).all():
         raise ValueError(f"a position of iteration {ask.iteration} is not a finite number")
-    connection.execute(
-        insert(iterations).values(
-            job_id=job["id"],
-            iteration=ask.iteration,
-            designs=len(ask.positions),
-            positions=ask.positions.astype("<f8").tobytes(),
-            optimizer_state=ask.state,
-            ask_digest=digest or ask_digest(ask.positions, ask.state),
-            asked_at=now,
-        )
-    )
+    digest = ask_digest(ask.positions, ask.state)
+    connection.execute(insert(iterations), _ask_row(job, ask, digest, now))
+
+
+def _ask_row(job: Row, ask: Ask, digest: str | None, now: datetime) -> dict[str, Any]:
+    return {
+        "job_id": job["id"],
+        "iteration": ask.iteration,
+        "designs": len(ask.positions),
+        "positions": ask.positions.astype("<f8").tobytes(),
+        "optimizer_state": ask.state,
+        "ask_digest": digest,
+        "asked_at": now,
+    }
 
 
 def complete_iteration(
@@ -318,31 +314,28 @@ def complete_iteration(
     link = Link(done.iteration, _floats(row.positions, row.designs), row.ask_digest)
     previous = _at(job["id"], done.iteration - 1)
     connection.execute(update(iterations).where(previous).values(optimizer_state={}))
-    return _insert_results(connection, job, chain_documents(job), link, done, now)
+    changes, results = _results(job, chain_documents(job), link, done, now)
+    (committed,) = results.pop(iterations)
+    connection.execute(update(iterations).where(_at(job["id"], done.iteration)), committed)
+    for table, rows in results.items():
+        connection.execute(insert(table), rows)
+    return changes
 
 
-def _insert_results(
-    connection: Connection,
-    job: Row,
-    documents: ChainDocuments,
-    link: Link,
-    done: CompletedIteration,
-    now: datetime,
-) -> dict[str, Any]:
+def _results(
+    job: Row, documents: ChainDocuments, link: Link, done: CompletedIteration, now: datetime
+) -> tuple[dict[str, Any], dict[Table, list[dict[str, Any]]]]:
+    """Return changed columns of the job, and rows by table: columns of the iteration, designs."""
     columns = done.columns
     before = job["head"] or documents.digest
     digest = iteration_digest(before, documents, link, columns, done.reevaluation)
     particle, best = done.best or (None, None)
-    connection.execute(
-        update(iterations)
-        .where(_at(job["id"], done.iteration))
-        .values(
-            committed_at=now,
-            evaluate_seconds=done.evaluate_seconds,
-            digest=digest,
-            **fitness_summary(done.fitness, best, job["best_fitness"]),
-        )
-    )
+    committed = {
+        "committed_at": now,
+        "evaluate_seconds": done.evaluate_seconds,
+        "digest": digest,
+        **fitness_summary(done.fitness, best, job["best_fitness"]),
+    }
     place = {"job_id": job["id"], "iteration": done.iteration}
     keys = done.keys or [None] * len(columns)
     designs = columns.designs.astype("<f8")
@@ -351,12 +344,11 @@ def _insert_results(
         {**place, "particle": index, "design": design.tobytes(), "walk_key": key, **result}
         for index, (design, key, result) in enumerate(zip(designs, keys, results, strict=True))
     ]
-    connection.execute(insert(evaluations), rows)
+    tables = {iterations: [committed], evaluations: rows}
     again = done.reevaluation
     if again is not None:
         result = _result(again.objectives, again.statuses, again.fitness)
-        row = {**place, "particle": again.particle, **result}
-        connection.execute(insert(reevaluations).values(row))
+        tables[reevaluations] = [{**place, "particle": again.particle, **result}]
     changes = {
         "head": digest,
         "iterations": done.iteration + 1,
@@ -365,7 +357,7 @@ def _insert_results(
     if best is not None and (job["best_fitness"] is None or best < job["best_fitness"]):
         changes |= {"best_fitness": best, "best_iteration": done.iteration}
         changes |= {"best_particle": particle}
-    return changes
+    return changes, tables
 
 
 def _result(
@@ -403,11 +395,10 @@ def journal_of(connection: Connection, job: Row) -> tuple[JournalEntry, ...]:
 
 
 def _journal_entry(row: Row) -> JournalEntry:
-    statuses = np.frombuffer(row["statuses"], dtype=np.uint8)
-    objectives = np.frombuffer(row["objectives"], dtype="<f8").reshape(len(statuses), -1)
-    size = len(row["keys"]) // len(statuses)
-    keys = tuple(row["keys"][k * size : (k + 1) * size] for k in range(len(statuses)))
-    return JournalEntry(row["case_index"], keys, Outcome(objectives, statuses))
+    count = len(row["statuses"])
+    size = len(row["keys"]) // count
+    keys = tuple(row["keys"][k * size : (k + 1) * size] for k in range(count))
+    return JournalEntry(row["case_index"], keys, _outcome(row))
 
 
 def take_history(
@@ -432,25 +423,30 @@ def take_history(
             raise Conflict(
                 f"job {parent} has not the {end} iterations any more that were to be forked"
             )
+        tables = defaultdict[Table, list[dict[str, Any]]](list)
         for link in links:
             index = link.iteration
             ask = Ask(index, link.positions, taken.state if index == end - 1 else {})
             if index == end - 1:
                 link = replace(link, ask_digest=ask_digest(ask.positions, ask.state))  # noqa: PLW2901
-            insert_ask(connection, job, ask, expected=index, now=now, digest=link.ask_digest)
-            results = columns.of_iteration(index)
+            of_parent = columns.of_iteration(index)
             done = CompletedIteration(
                 index,
-                results.designs,
+                of_parent.designs,
                 tuple(
-                    Outcome(results.objectives[:, case], results.statuses[:, case])
-                    for case in range(results.statuses.shape[1])
+                    Outcome(of_parent.objectives[:, case], of_parent.statuses[:, case])
+                    for case in range(of_parent.statuses.shape[1])
                 ),
-                results.fitness if taken.fitness is None else taken.fitness[index],
+                of_parent.fitness if taken.fitness is None else taken.fitness[index],
                 evaluate_seconds=0.0,
                 precision=precision,
                 reevaluation=reevaluated.get(index),
             )
-            row = {**job, **changes}
-            changes |= _insert_results(connection, row, documents, link, done, now)
+            changed, results = _results({**job, **changes}, documents, link, done, now)
+            changes |= changed
+            results[iterations][0] |= _ask_row(job, ask, link.ask_digest, now)
+            for table, rows in results.items():
+                tables[table] += rows
+        for table, rows in tables.items():
+            connection.execute(insert(table), rows)
     return changes | {"evaluations_saved": changes["evaluations"]}

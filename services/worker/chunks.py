@@ -107,11 +107,7 @@ def _by_designs(
 
 
 def _by_case(
-    durations: Sequence[float],
-    designs: int,
-    slots: int,
-    lanes: int,
-    bounds: tuple[float, float],
+    durations: Sequence[float], designs: int, slots: int, lanes: int, bounds: tuple[float, float]
 ) -> tuple[Chunk, ...]:
     blocks = math.ceil(designs / lanes)
     shortest, longest = bounds

@@ -109,9 +109,7 @@ class RayEvaluator:
     def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
         """Return when Ray is open, and close this evaluator if it cannot be.
 
-        Raises:
-            EvaluatorUnavailable: Ray cannot be opened.
-            EvaluationStopped: `should_stop` returned true.
+        Raises EvaluatorUnavailable then, and EvaluationStopped once `should_stop` returns true.
         """
         try:
             awaited(self._connection.opened, should_stop)

@@ -90,13 +90,9 @@ def _is_here(host: str) -> bool:
 
 
 class JoinedNode:
-    """A node without CPUs for a process on a machine that has no node of the cluster.
+    """A node without CPUs for a process on a machine that has no node of a cluster.
 
-    Args:
-        address: Head of the cluster, `host:port`.
-
-    Raises:
-        EvaluatorUnavailable: The node cannot be started.
+    address: `host:port` of its head. Raises EvaluatorUnavailable if the node cannot be started.
     """
 
     def __init__(self, address: str) -> None:

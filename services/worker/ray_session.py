@@ -91,8 +91,7 @@ class RaySession:
     def nodes(self) -> list[dict[str, Any]]:
         """Return the nodes that are alive, as `ray.nodes`, which would wait for a lost head.
 
-        Raises:
-            EvaluatorUnavailable: The head does not answer within two seconds.
+        Raises EvaluatorUnavailable if the head does not answer within two seconds.
         """
         client = self.ray._private.worker.global_worker.gcs_client  # noqa: SLF001 - with a time-out
         try:
@@ -121,15 +120,11 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
     """Start a local cluster, or connect to the one at an address.
 
     A local cluster ends with the thread that has opened it. Signal handlers stay as they are.
+    Raises EvaluatorUnavailable if Ray cannot be started or reached.
 
-    Args:
-        address: None for a local cluster; `host:port` of a cluster's head, which this process
-            joins as a node without CPUs unless one runs on this machine; `auto` for the cluster
-            that has a node here.
-        cpus: CPUs of a local cluster; all of this machine's by default.
-
-    Raises:
-        EvaluatorUnavailable: Ray cannot be started or reached.
+    address: None for a local cluster; `host:port` of a cluster's head, which this process joins as
+    a node without CPUs unless one runs on this machine; `auto` for the cluster that has a node
+    here. cpus: of a local cluster; all of this machine's by default.
     """
     for name, value in _BEFORE_IMPORT.items():
         os.environ.setdefault(name, value)

@@ -42,6 +42,7 @@ def expected(client: httpx2.Client, job: Job, commit: Commit) -> list[dict[str, 
                 row[f"{scenario}.status"] = walk["status"]
                 row[f"{scenario}.utility"] = walk["utility"]
                 row |= {f"{scenario}.{name}": walk["objectives"][name] for name in OBJECTIVE_NAMES}
+                row |= {f"{scenario}.{name}": v for name, v in walk["measurements"].items()}
             rows.append(row)
     return rows
 

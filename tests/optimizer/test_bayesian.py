@@ -46,10 +46,9 @@ def test_a_variable_that_matters_less_has_a_longer_length() -> None:
     values = np.sin(8.0 * designs[:, 0]) + 0.01 * designs[:, 1]
     model = GaussianProcess(space)
     model.fit(designs, (values - values.mean()) / values.std())
-    origin, along, across = np.array([[0.5, 0.5], [0.5, 0.9], [0.9, 0.5]])
-    model.learn(origin[np.newaxis], np.zeros(1))
-    _, deviation = model.predict(np.array([along, across]))
-    assert deviation[0] < 0.5 * deviation[1]
+    first, second = model.lengths()
+    assert second > 3.0 * first
+    assert first * second == pytest.approx(1.0)
 
 
 def test_any_two_choices_are_equally_far_apart() -> None:
@@ -94,6 +93,14 @@ def test_a_sample_comes_first_and_then_batches() -> None:
     asked = designs_asked("bayesian", MIXED, mixed_bowl, 24, sample=9, batch=3)
     assert [len(designs) for designs in asked] == [9, 3, 3, 3, 3, 3]
     assert np.ptp(asked[0][:, 0]) > 1.5
+
+
+def test_the_region_halves_after_failures_and_begins_again_when_too_small() -> None:
+    asked = designs_asked("bayesian", LINE, lambda x: np.ones(len(x)), 60, sample=5, batch=4)
+    best = asked[0][0, 0]
+    reaches = [float(np.abs(designs - best).max()) for designs in asked[1:]]
+    assert all(reach <= 4.0 * 0.5**k for k, reach in enumerate(reaches[:7]))
+    assert reaches[6] < 0.1 and max(reaches[7:]) > 0.5
 
 
 def test_a_best_design_at_all_bounds_is_found_exactly() -> None:

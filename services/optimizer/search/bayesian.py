@@ -1,9 +1,10 @@
-"""Bayesian optimization: expected improvement of a Gaussian process."""
+"""Bayesian optimization: expected improvement of a Gaussian process in a trust region."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -18,11 +19,19 @@ from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 
+_LONGEST: Final = 1.6
+_FIRST: Final = 0.8
+_SHORTEST: Final = 0.5**7
+"""Sides of a trust region, as shares of the box (Eriksson et al. 2019)."""
+
+_SUCCESSES: Final = 3
+"""Improving batches in a row after which the sides double."""
+
 _CANDIDATES: Final = 1_024
-"""Points of the box among which the expected improvement is compared."""
+"""Points of the region among which the expected improvement is compared."""
 
 _WIDTHS: Final = (0.2, 0.1, 0.05, 0.02, 0.01)
-"""Standard deviations of steps from the best candidates, as shares of the box."""
+"""Standard deviations of steps from the best candidates, as shares of the region."""
 
 _STEPS: Final = 256
 """Candidates of each width."""
@@ -54,10 +63,12 @@ def bayesian(
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
-    """Search by expected improvement of a Gaussian process, one design after another.
+    """Search by expected improvement of a Gaussian process, in the trust region of TuRBO-1.
 
-    A design of a batch is chosen as if the fitness of the previous ones were as expected (Kriging
-    believer, Ginsbourger et al. 2010).
+    The region is about the best design, longer in variables that matter less; it grows with
+    success, shrinks with failure (Eriksson et al. 2019), and is as large as at first when it has
+    become too small. A design of a batch is chosen as if the fitness of the previous ones were as
+    expected (Kriging believer, Ginsbourger et al. 2010).
     """
     designs = space.designs(_latin_hypercube(space, settings.sample, random))
     fitness = yield space.positions(designs)
@@ -65,32 +76,58 @@ def bayesian(
         designs = np.vstack([space.designs(start.positions), designs])
         fitness = np.append(start.fitness, fitness)
     model = GaussianProcess(space)
+    length, successes, failures = _FIRST, 0, 0
+    patience = math.ceil(max(4.0, space.dimension) / settings.batch)
     while True:
         best = np.sort(np.argsort(fitness, kind="stable")[: settings.data])
         model.fit(designs[best], normal_scores(fitness[best]))
+        sides = length * model.lengths()
         batch = []
         for _ in range(settings.batch):
-            batch.append(_most_promising(model, space, random))
+            batch.append(_most_promising(model, space, sides, random))
             expected, _ = model.predict(batch[-1][np.newaxis])
             model.learn(np.vstack([model.designs, batch[-1]]), np.append(model.values, expected))
         feedback = yield space.positions(np.array(batch))
+        improved = feedback.min() < fitness.min()
+        successes, failures = (successes + 1, 0) if improved else (0, failures + 1)
+        if successes == _SUCCESSES:
+            length, successes = min(2.0 * length, _LONGEST), 0
+        elif failures == patience:
+            length, failures = 0.5 * length, 0
+        length = _FIRST if length < _SHORTEST else length
         designs, fitness = np.vstack([designs, batch]), np.append(fitness, feedback)
 
 
-def _most_promising(model: GaussianProcess, space: Space, random: RandomNumbers) -> Floats:
-    """Return the new design with the largest expected improvement found."""
+def _most_promising(
+    model: GaussianProcess, space: Space, sides: Floats, random: RandomNumbers
+) -> Floats:
+    """Return the new design with the largest expected improvement found in a region."""
     least = float(model.values.min())
     best = model.designs[[np.argmin(model.values)]]
-    points = space.designs(_latin_hypercube(space, _CANDIDATES, random))
+    region = _region(space, best[0], sides)
+    points = region.designs(_latin_hypercube(region, _CANDIDATES, random))
     merit = log_improvement(*model.predict(points), least)
     for width in _WIDTHS:
         top = points[np.argsort(-merit, kind="stable")[:_PARENTS]]
-        steps = _steps(space, np.vstack([best, top]), width, random)
+        steps = _steps(region, np.vstack([best, top]), width, random)
         points = np.vstack([points, steps])
         merit = np.append(merit, log_improvement(*model.predict(steps), least))
     known = (points[:, np.newaxis] == model.designs).all(axis=2).any(axis=1)
+    if known.all() and (sides < 2.0).any():
+        return _most_promising(model, space, np.full(space.dimension, 2.0), random)
     chosen: Floats = points[np.argmax(np.where(known, -np.inf, merit))]
     return chosen
+
+
+def _region(space: Space, centre: Floats, sides: Floats) -> Space:
+    """Return the part of a box about a design; choices are free, integers move by one at least."""
+    axes = []
+    for axis, middle, side in zip(space.axes, centre.tolist(), sides.tolist(), strict=True):
+        half = 0.5 * side * (axis.high - axis.low)
+        half = max(1.0, round(half)) if axis.kind == "integer" else half
+        low, high = max(axis.low, middle - half), min(axis.high, middle + half)
+        axes.append(axis if axis.kind == "categorical" else replace(axis, low=low, high=high))
+    return Space(axes)
 
 
 def _steps(space: Space, parents: Floats, width: float, random: RandomNumbers) -> Floats:
@@ -185,6 +222,12 @@ class GaussianProcess:
         shape, _ = _matern(weights, self._squares(designs, designs))
         covariance = signal * shape + (noise + _LEAST_NOISE) * np.eye(len(values))
         self._inverse, _ = inverted(covariance)
+
+    def lengths(self) -> Floats:
+        """Return (d,) lengths of the kernel, whose geometric mean is 1."""
+        logarithms = -0.5 * self._parameters[: self._space.dimension]
+        lengths: Floats = np.exp(logarithms - logarithms.mean())
+        return lengths
 
     def predict(self, designs: Floats) -> tuple[Floats, Floats]:
         """Return (n,) means and standard deviations."""

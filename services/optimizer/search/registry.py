@@ -160,7 +160,7 @@ _BUILT_IN: Final[dict[str, Method]] = {
     ),
     "bayesian": from_generator(
         BayesianSettings,
-        "Bayesian: expected improvement of a Gaussian process, for few evaluations (Jones 1998)",
+        "Gaussian process in a trust region, for few evaluations (TuRBO, Eriksson et al. 2019)",
         bayesian,
         libraries=("scipy",),
     ),

@@ -34,6 +34,18 @@ def test_it_goes_by_the_number_of_variables(dimension: int, method: str) -> None
     assert given.ask().tobytes() == expected.ask().tobytes()
 
 
+def test_it_centres_integers_where_they_are_most_of_the_variables() -> None:
+    space = Space([Axis(0.0, 9.0, "integer")] * 2 + [Axis(0.0, 1.0)])
+    assert chosen_method(AutoSettings(particles=7), space).model_dump() == {
+        **OPTIMIZERS["cma-es"].model_dump(),
+        "particles": 7,
+        "sigma": 0.1,
+        "integers": "centred",
+    }
+    half = Space(space.axes[1:])
+    assert chosen_method(AutoSettings(), half) == OPTIMIZERS["cma-es"]
+
+
 def test_the_size_of_iterations_stays_and_with_it_the_budget() -> None:
     spec = JobSpec.model_validate({"optimizer": {"name": "auto", "particles": 8}})
     assert spec.resolved().optimizer.particles == 8

@@ -149,21 +149,27 @@ def test_only_the_order_of_fitness_values_counts() -> None:
     np.testing.assert_array_equal(np.vstack(plain), np.vstack(stretched))
 
 
-def test_a_variable_never_stops_trying_other_integers_and_choices() -> None:
+@pytest.mark.parametrize("integers", ["widened", "centred"])
+def test_a_variable_never_stops_trying_other_integers_and_choices(integers: str) -> None:
     """A margin keeps their chance, also where one value has long been best."""
     space = Space([Axis(0.0, 1.0), Axis(0.0, 9.0, "integer"), Axis(0.0, 2.0, "categorical")])
-    asked = designs_asked(
-        "cma-es", space, lambda x: x[:, 0] + (x[:, 1] != 4.0) + (x[:, 2] != 1.0), 600, growth=1.0
-    )
+
+    def height(x: Floats) -> Floats:
+        return x[:, 0] + (x[:, 1] != 4.0) + (x[:, 2] != 1.0)
+
+    asked = designs_asked("cma-es", space, height, 600, growth=1.0, integers=integers)
     late = np.vstack(asked)[200:]
     assert (late[:, 1] != 4.0).any() and (late[:, 2] != 1.0).any()
 
 
-def test_integers_of_two_and_of_very_many_values_are_searched_too() -> None:
+@pytest.mark.parametrize("integers", ["widened", "centred"])
+def test_integers_of_two_and_of_very_many_values_are_searched_too(integers: str) -> None:
     space = Space([Axis(0.0, 1.0, "integer"), Axis(0.0, 1e6, "integer")])
-    asked = designs_asked(
-        "cma-es", space, lambda x: np.abs(x[:, 1] - 123_456.0) / 1e6 + x[:, 0], 800
-    )
+
+    def height(x: Floats) -> Floats:
+        return np.abs(x[:, 1] - 123_456.0) / 1e6 + x[:, 0]
+
+    asked = designs_asked("cma-es", space, height, 800, integers=integers)
     best = min(np.vstack(asked).tolist(), key=lambda x: abs(x[1] - 123_456.0) / 1e6 + x[0])
     assert best[0] == 0.0 and abs(best[1] - 123_456.0) < 100.0
 

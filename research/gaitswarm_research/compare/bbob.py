@@ -39,8 +39,8 @@ def bbob(
         str, typer.Option(metavar="NAME,...", help="Methods and rivals to compare.")
     ] = _METHODS,
     instances: Annotated[
-        int, typer.Option(min=1, max=15, help="Instances of each of the 24 functions.")
-    ] = 3,
+        str, typer.Option(metavar="FIRST-LAST", help="Instances of each of the 24 functions.")
+    ] = "1-3",
     budget: Annotated[int, typer.Option(min=2, help="Evaluations of each run, per variable.")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="Seed from which all others are drawn.")] = 1,
     output: Annotated[Path, typer.Option("--output", "-o", help="CSV file of the runs.")] = Path(
@@ -85,12 +85,12 @@ def bbob(
 
 
 def tasks(
-    suite: Suite, dimensions: str, methods: str, *, instances: int, budget: int, seed: int
+    suite: Suite, dimensions: str, methods: str, *, instances: str, budget: int, seed: int
 ) -> list[Task]:
     """List the runs of a comparison; `budget`: evaluations per variable.
 
     Raises:
-        InvalidRequest: A method or dimension is unknown, or a library is missing.
+        InvalidRequest: A method, dimension or instance is unknown, or a library is missing.
     """
     if find_spec("cocoex") is None:
         raise InvalidRequest(
@@ -103,17 +103,22 @@ def tasks(
             raise InvalidRequest(f"{size!r} is not one of {known}", field="dimensions")
     for name in names:
         check_method(name)
+    first, _, last = instances.partition("-")
+    numbers = [int(text) if text.isdecimal() else 0 for text in (first, last or first)]
+    if not 1 <= numbers[0] <= numbers[1] <= 15:
+        raise InvalidRequest("must be from 1 to 15, such as 3 or 1-3", field="instances")
+    run_seeds = seeds(15, seed)
     return [
         Task(
-            f"{suite}_f{function:03}_i{instance + 1:02}_d{int(size):02}",
+            f"{suite}_f{function:03}_i{instance:02}_d{int(size):02}",
             name,
             "",
             budget * int(size),
-            instance,
-            run_seed,
+            0,
+            run_seeds[instance - 1],
         )
         for name, size, function in product(names, sizes, FUNCTIONS)
-        for instance, run_seed in enumerate(seeds(instances, seed))
+        for instance in range(numbers[0], numbers[1] + 1)
     ]
 
 

@@ -146,7 +146,7 @@ def check_method(name: str) -> None:
 @cache
 def _views() -> Mapping[str, Any]:
     """Methods that can be compared by one fitness, by name."""
-    return {view.name: view for view in optimizers() if view.name not in ("auto", "hype")}
+    return {view.name: view for view in optimizers() if view.name != "hype"}
 
 
 def _version(distribution: str) -> str:

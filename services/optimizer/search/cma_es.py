@@ -56,6 +56,12 @@ class CmaEsSettings(SearchSettings):
         le=10.0,
         description="Factor of the population at each restart: 2 is IPOP, 1 keeps it.",
     )
+    integers: Literal["widened", "centred"] = Field(
+        default="widened",
+        description="How integers keep changing. widened: by the smallest width of their"
+        " distribution. centred: around the values of good designs; better where most variables"
+        " are integers.",
+    )
 
 
 class DistributionState(BaseModel):
@@ -143,7 +149,10 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
     def distribution(self) -> NormalDistribution:
         if self._distribution is None or self._distribution.state is not self.state.distribution:
             self._distribution = NormalDistribution(
-                self.space, self.population, self.state.distribution
+                self.space,
+                self.population,
+                self.state.distribution,
+                centres=self.settings.integers == "centred",
             )
         return self._distribution
 
@@ -213,6 +222,12 @@ _WIDEST: Final = 1.0
 _OTHERS: Final = 0.5
 """Average number of samples of a generation with another integer or choice than most."""
 
+_MUTATED: Final = 0.27
+"""Least share of samples with another integer than the mean's, where integers are centred."""
+
+_NARROW: Final = 0.3
+"""Standard deviation of an integer, in its own unit, below which sigma is adapted without it."""
+
 _CONVERGED: Final = 1e-9
 """Standard deviation, as a share of the range, at which a distribution has converged."""
 
@@ -248,21 +263,27 @@ class NormalDistribution:
 
     A sample beyond a bound is evaluated at the bound and learned from where it was. The mean stays
     near the box. The scale of an integer never becomes so small that no sample has another value
-    (CMA-ES with margin, Hamano et al. 2022), nor do probabilities of choices. Sums have a fixed
-    order and matrices are decomposed without a library, so that all processors give the same bits.
+    (CMA-ES with margin, Hamano et al. 2022), nor do probabilities of choices. Centred integers
+    follow CatCMA with margin (Hamano et al. 2025). Sums have a fixed order and matrices are
+    decomposed without a library, so that all processors give the same bits.
     """
 
-    def __init__(self, space: Space, size: int, state: DistributionState) -> None:
+    def __init__(
+        self, space: Space, size: int, state: DistributionState, *, centres: bool = False
+    ) -> None:
         d = space.dimension
         self._space: Final = space
         self._size: Final = size
         self.state: Final = state
         self._decomposed: _Root | None = None
         self._chosen: Final = np.flatnonzero(space.categorical).tolist()
+        self._centres: Final = centres and bool(space.integer.any())
+        self._integers: Final = np.flatnonzero(space.integer)
         raw = [math.log((size + 1) / 2.0) - math.log(i + 1.0) for i in range(size)]
         better = [max(w, 0.0) for w in raw]
         worse = [min(w, 0.0) for w in raw]
         self._better: Final = np.array(better) / math.fsum(better)
+        self._better_count: Final = int(np.count_nonzero(self._better))
         self._mu_eff: Final = 1.0 / math.fsum(self._better**2)
         self._worse: Final = np.array(worse) / -math.fsum(worse)
         self._worse_mu_eff: Final = 1.0 / math.fsum(self._worse**2)
@@ -284,9 +305,12 @@ class NormalDistribution:
         z, y = self._steps(random)
         choices = self._choices(random)[order] if self._chosen else None
         z, y = z[order], y[order]
+        distances, mutated = self._borders()[1], np.zeros(len(self._integers), dtype=np.bool_)
+        if self._centres:
+            y, mutated = self._centred(y)
         shift = product(self._better[np.newaxis], y)[0]
         self.state.mean = self.state.mean + self.state.sigma * self.state.scale * shift
-        h_sigma = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
+        h_sigma = self._adapt_sigma(product(self._better[np.newaxis], z)[0], self._is_free())
         path_step = h_sigma * self.state.scale * shift
         squares = np.ascontiguousarray(np.square(z).T).sum(axis=0)
         # Distant bad samples could remove more variance than there is, so each counts as d / |z|^2
@@ -303,7 +327,10 @@ class NormalDistribution:
         self.state.scale = np.minimum(self.state.scale, _WIDEST / self.state.sigma)
         reach = _REACH * self.state.sigma * self.state.scale
         self.state.mean = np.clip(self.state.mean, -reach, 1.0 + reach)
-        self._keep_trying_integers()
+        if self._centres:
+            self._keep_near_borders(distances, mutated)
+        else:
+            self._widen_integers()
         if choices is not None:
             self._learn_choices(choices)
 
@@ -350,14 +377,20 @@ class NormalDistribution:
         ]
         return np.array(columns, dtype=np.float64).T
 
-    def _adapt_sigma(self, step: Floats) -> float:
+    def _is_free(self) -> NDArray[np.bool_]:
+        """Return (d,) whether steps in a variable say something about sigma."""
+        deviation = self.state.sigma * self.state.scale * self._space.span
+        is_free = ~self._space.categorical & (~self._space.integer | (deviation > _NARROW))
+        return is_free if self._centres and is_free.any() else np.ones_like(is_free)
+
+    def _adapt_sigma(self, step: Floats, is_free: NDArray[np.bool_]) -> float:
         """Adapt sigma (CSA) and return h_sigma: 0 while the other paths wait, else 1."""
-        d, mu_eff = self._space.dimension, self._mu_eff
+        d, mu_eff = int(np.count_nonzero(is_free)), self._mu_eff
         rate = (mu_eff + 2.0) / (d + mu_eff + 5.0)
         damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (d + 1.0)) - 1.0)
         self.state.sigma_path = (1.0 - rate) * self.state.sigma_path + math.sqrt(
             rate * (2.0 - rate) * mu_eff
-        ) * step
+        ) * np.where(is_free, step, 0.0)
         self.state.weights[0] = (1.0 - rate) ** 2 * self.state.weights[0] + rate * (2.0 - rate)
         length = math.fsum(self.state.sigma_path**2)
         expected = math.sqrt(d) * (1.0 - 1.0 / (4.0 * d) + 1.0 / (21.0 * d * d))
@@ -404,7 +437,7 @@ class NormalDistribution:
         reached = decay * decay * reached + (0.0 if stalled else added)
         return decay * path + math.sqrt(added * self._mu_eff) * step, reached
 
-    def _keep_trying_integers(self) -> None:
+    def _widen_integers(self) -> None:
         """Widen the scales of integers so that some samples have other values."""
         require_room_for_scipy()
         from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
@@ -417,6 +450,64 @@ class NormalDistribution:
             nearest = min(abs(float(self.state.mean[j]) * last - edge) for edge in edges) / last
             least = nearest / away / self.state.sigma
             self.state.scale[j] = max(self.state.scale[j], least)
+
+    def _borders(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """Return of every integer the border to the value next to the mean's, how many standard
+        deviations the mean is away from it, and whether the mean's value is the first or last.
+        """
+        span = self._space.span[self._integers]
+        mean = self.state.mean[self._integers] * span
+        value = np.clip(np.rint(mean), 0.0, span)
+        is_above = (value == 0.0) | ((mean > value) & (value < span))
+        border = value + np.where(is_above, 0.5, -0.5)
+        deviation = self.state.sigma * self.state.scale[self._integers] * span
+        return border, np.abs(mean - border) / deviation, (value == 0.0) | (value == span)
+
+    def _centred(self, y: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Move integers of the better samples to the values that were evaluated.
+
+        Those with another value than the mean's move, and the others as far as keeps the average
+        (integer centring). Returns also (k,) whether an integer has another value in any of them.
+        """
+        integers, count = self._integers, self._better_count
+        span = self._space.span[integers]
+        deviation = self.state.sigma * self.state.scale[integers] * span
+        mean = self.state.mean[integers] * span
+        drawn = mean + deviation * y[:count, integers]
+        value = np.clip(np.rint(drawn), 0.0, span)
+        is_other = value != np.clip(np.rint(mean), 0.0, span)
+        all_rows = np.ones((1, count))
+        move = np.where(is_other, value - drawn, 0.0)
+        bias = product(all_rows, move)[0]
+        back = np.where(~is_other & ((value - drawn) * bias < 0.0), value - drawn, 0.0)
+        room = product(all_rows, back)[0]
+        share = np.minimum(1.0, -bias / np.where(room == 0.0, 1.0, room))
+        centred = y.copy()
+        centred[:count, integers] += (move + share * back) / deviation
+        return centred, is_other.any(axis=0)
+
+    def _keep_near_borders(self, before: Floats, mutated: NDArray[np.bool_]) -> None:
+        """Keep the mean of every integer within reach of a border.
+
+        before: distances to it before the update [standard deviations]; the distance to the only
+        border of a first or last value does not fall while no better sample has another value.
+        """
+        require_room_for_scipy()
+        from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
+
+        integers = self._integers
+        span, count = self._space.span[integers], len(integers) + len(self._chosen)
+        farthest = float(-ndtri(0.5 * (1.0 - (1.0 - _MUTATED) ** (1.0 / count))))
+        least = 0.5 / farthest / span / self.state.sigma
+        self.state.scale[integers] = np.maximum(self.state.scale[integers], least)
+        border, distance, is_outermost = self._borders()
+        nearest = np.where(is_outermost & ~mutated, np.minimum(before, farthest), 0.0)
+        reach = np.clip(distance, nearest, farthest) * self.state.sigma * self.state.scale[integers]
+        mean = self.state.mean[integers]
+        moved = border / span + np.copysign(reach, mean - border / span)
+        self.state.mean[integers] = np.where(
+            (distance < nearest) | (distance > farthest), moved, mean
+        )
 
     def _learn_choices(self, choices: Floats) -> None:
         """Move probabilities towards the choices of better samples, above the minimum."""

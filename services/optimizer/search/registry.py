@@ -125,8 +125,11 @@ _LARGEST_DIMENSION: Final = 64
 
 def chosen_method(settings: AutoSettings, space: Space) -> SearchSettings:
     """Choose the method of a search."""
-    chosen = CmaEsSettings if space.dimension <= _LARGEST_DIMENSION else DeSettings
-    return chosen(particles=settings.particles)
+    if space.dimension > _LARGEST_DIMENSION:
+        return DeSettings(particles=settings.particles)
+    if 2 * np.count_nonzero(space.integer) > space.dimension:
+        return CmaEsSettings(particles=settings.particles, sigma=0.1, integers="centred")
+    return CmaEsSettings(particles=settings.particles)
 
 
 def _create_chosen(settings: AutoSettings, space: Space, budget: int, seed: int) -> Optimizer:
@@ -154,7 +157,8 @@ def random_search(
 _BUILT_IN: Final[dict[str, Method]] = {
     "auto": Method(
         AutoSettings,
-        "CMA-ES, or differential evolution for more than 64 variables; chosen on submission",
+        "CMA-ES, its settings by the share of integers, or differential evolution for more than 64"
+        " variables; chosen on submission",
         _create_chosen,
         uses_start=True,
     ),

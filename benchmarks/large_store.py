@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.store import Store, open_store
-from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import N_MEASUREMENTS, Outcome, Status
 
 PARTICLES: Final = 25
 _LEASE: Final = 3600.0
@@ -115,7 +115,7 @@ def walk(
     for k in range(scenarios):
         distance = ((share - 0.3 - 0.05 * k) ** 2).mean(axis=1)
         scale = 1.0 + 2.0 * distance[:, None] + 0.1 * rough[:, None] * np.linspace(0.1, 1.0, 6)
-        objectives = _TYPICAL * scale
+        objectives = np.hstack([_TYPICAL * scale, np.ones((len(share), N_MEASUREMENTS))])
         fell = (rough < 0.1) & (np.floor(rough * 1e3).astype(int) % scenarios == k)
         objectives[fell] = np.nan
         statuses = np.where(fell, Status.FELL, Status.OK).astype(np.uint8)

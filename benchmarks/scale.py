@@ -150,7 +150,8 @@ class Free:
         begun = time.perf_counter()
         count = len(request.designs)
         values = 1.0 + request.designs.sum(axis=1, keepdims=True) ** 2
-        outcome = Outcome(np.tile(values, len(OBJECTIVES)), np.zeros(count, np.uint8))
+        results = np.tile(values, len(request.cases[0].objectives))
+        outcome = Outcome(results, np.zeros(count, np.uint8))
         self.seconds += time.perf_counter() - begun
         return (outcome,) * len(request.cases)
 

@@ -24,26 +24,37 @@ def test_it_stands_for_the_default_method() -> None:
     assert JobSpec.model_validate({"optimizer": "auto"}).search == OPTIMIZERS[DEFAULT_METHOD]
 
 
-@pytest.mark.parametrize(("dimension", "method"), [(1, "cma-es"), (64, "cma-es"), (65, "de")])
-def test_it_goes_by_the_number_of_variables(dimension: int, method: str) -> None:
+@pytest.mark.parametrize(
+    ("dimension", "budget", "method"),
+    [
+        (1, 101, "cma-es"),
+        (64, 101, "cma-es"),
+        (65, 101, "de"),
+        (64, 100, "bayesian"),
+        (65, 100, "de"),
+    ],
+)
+def test_it_goes_by_the_numbers_of_variables_and_evaluations(
+    dimension: int, budget: int, method: str
+) -> None:
     space = Space([Axis(0.0, 1.0)] * dimension)
-    assert chosen_method(AutoSettings(particles=7), space).name == method
+    assert chosen_method(AutoSettings(particles=7), space, budget).name == method
     given, expected = (
-        create_search({"name": n, "particles": 7}, space, 99, 1) for n in ("auto", method)
+        create_search({"name": n, "particles": 7}, space, budget, 1) for n in ("auto", method)
     )
     assert given.ask().tobytes() == expected.ask().tobytes()
 
 
 def test_it_centres_integers_where_they_are_most_of_the_variables() -> None:
     space = Space([Axis(0.0, 9.0, "integer")] * 2 + [Axis(0.0, 1.0)])
-    assert chosen_method(AutoSettings(particles=7), space).model_dump() == {
+    assert chosen_method(AutoSettings(particles=7), space, 999).model_dump() == {
         **OPTIMIZERS["cma-es"].model_dump(),
         "particles": 7,
         "sigma": 0.1,
         "integers": "centred",
     }
     half = Space(space.axes[1:])
-    assert chosen_method(AutoSettings(), half) == OPTIMIZERS["cma-es"]
+    assert chosen_method(AutoSettings(), half, 999) == OPTIMIZERS["cma-es"]
 
 
 def test_the_size_of_iterations_stays_and_with_it_the_budget() -> None:
@@ -61,7 +72,7 @@ def test_a_spec_that_is_not_resolved_yet_searches_by_the_same_method() -> None:
 def test_a_job_of_any_kind_is_resolved_to_the_method() -> None:
     identification = {"kind": "identification", "recordings": ["0" * 32]}
     for document in ({}, identification, calibration().model_dump()):
-        asked = SPECS.validate_python({**document, "optimizer": "auto"})
+        asked = SPECS.validate_python({**document, "optimizer": "auto", "iterations": 40})
         assert asked.resolved().optimizer == OPTIMIZERS[DEFAULT_METHOD]
 
 

@@ -31,6 +31,10 @@ def slope(designs: Floats) -> Floats:
     return np.asarray(designs.sum(axis=1))
 
 
+def bowl(designs: Floats) -> Floats:
+    return np.asarray(np.square(designs - 0.3).sum(axis=1))
+
+
 def test_a_model_predicts_between_its_data_and_is_unsure_beyond_them() -> None:
     model, designs = GaussianProcess(LINE), np.linspace(0.0, 5.0, 6)[:, np.newaxis]
     values = valley(designs) - valley(designs).mean()
@@ -96,11 +100,23 @@ def test_a_sample_comes_first_and_then_batches() -> None:
 
 
 def test_the_region_halves_after_failures_and_begins_again_when_too_small() -> None:
-    asked = designs_asked("bayesian", LINE, lambda x: np.ones(len(x)), 60, sample=5, batch=4)
+    asked = designs_asked(
+        "bayesian", LINE, lambda x: np.ones(len(x)), 60, sample=5, batch=4, handover=60
+    )
     best = asked[0][0, 0]
     reaches = [float(np.abs(designs - best).max()) for designs in asked[1:]]
     assert all(reach <= 4.0 * 0.5**k for k, reach in enumerate(reaches[:7]))
     assert reaches[6] < 0.1 and max(reaches[7:]) > 0.5
+
+
+def test_cma_es_goes_on_from_the_best_design_with_small_steps() -> None:
+    space = Space.continuous([-2.0] * 4, [5.0] * 4)
+    asked = designs_asked("bayesian", space, bowl, 80, handover=40)
+    before, after = np.vstack(asked[:31]), np.vstack(asked[31:])
+    assert [len(designs) for designs in asked[30:33]] == [1, 8, 8]
+    best = before[np.argmin(bowl(before))]
+    assert np.abs(after[:8] - best).mean() == pytest.approx(0.8 * 0.1 * 7.0, rel=0.4)
+    assert bowl(after).min() < bowl(best[np.newaxis])[0]
 
 
 def test_a_best_design_at_all_bounds_is_found_exactly() -> None:

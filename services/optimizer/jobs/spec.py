@@ -190,7 +190,7 @@ class Spec(BaseModel):
     def search(self) -> OptimizerSettings:
         """Settings of the search method; for `auto`, of the method that it selects."""
         if isinstance(self.optimizer, AutoSettings):
-            return chosen_method(self.optimizer, self.design_space().box)
+            return chosen_method(self.optimizer, self.design_space().box, self.budget)
         return self.optimizer
 
     @model_validator(mode="after")

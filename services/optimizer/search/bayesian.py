@@ -1,4 +1,4 @@
-"""Bayesian optimization: expected improvement of a Gaussian process in a trust region."""
+"""Bayesian optimization by a Gaussian process in a trust region, then CMA-ES."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.search.cma_es import CmaEs, CmaEsSettings
 from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.replayed import Proposals, Start
@@ -26,6 +27,9 @@ _SHORTEST: Final = 0.5**7
 
 _SUCCESSES: Final = 3
 """Improving batches in a row after which the sides double."""
+
+_SIGMA: Final = 0.1
+"""First standard deviation of CMA-ES, as a share of each variable's range."""
 
 _CANDIDATES: Final = 1_024
 """Points of the region among which the expected improvement is compared."""
@@ -48,18 +52,18 @@ class BayesianSettings(SearchSettings):
         default=10, ge=2, le=10_000, description="Initial designs, a Latin hypercube."
     )
     batch: int = Field(default=1, ge=1, le=1_000, description="Designs chosen by one model.")
-    data: int = Field(
-        default=200,
-        ge=10,
-        le=1_000,
-        description="Best designs that a model is fitted to, at most.",
+    handover: int = Field(
+        default=50,
+        ge=2,
+        le=500,
+        description="Evaluations after which CMA-ES goes on from the best design.",
     )
 
 
 def bayesian(
     settings: BayesianSettings,
     space: Space,
-    budget: int,  # noqa: ARG001 - the same for every budget
+    budget: int,
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
@@ -68,7 +72,7 @@ def bayesian(
     The region is about the best design, longer in variables that matter less; it grows with
     success, shrinks with failure (Eriksson et al. 2019), and is as large as at first when it has
     become too small. A design of a batch is chosen as if the fitness of the previous ones were as
-    expected (Kriging believer, Ginsbourger et al. 2010).
+    expected (Kriging believer, Ginsbourger et al. 2010). CMA-ES goes on with small steps.
     """
     designs = space.designs(_latin_hypercube(space, settings.sample, random))
     fitness = yield space.positions(designs)
@@ -78,9 +82,8 @@ def bayesian(
     model = GaussianProcess(space)
     length, successes, failures = _FIRST, 0, 0
     patience = math.ceil(max(4.0, space.dimension) / settings.batch)
-    while True:
-        best = np.sort(np.argsort(fitness, kind="stable")[: settings.data])
-        model.fit(designs[best], normal_scores(fitness[best]))
+    while len(fitness) < settings.handover:
+        model.fit(designs, normal_scores(fitness))
         sides = length * model.lengths()
         batch = []
         for _ in range(settings.batch):
@@ -96,6 +99,15 @@ def bayesian(
             length, failures = 0.5 * length, 0
         length = _FIRST if length < _SHORTEST else length
         designs, fitness = np.vstack([designs, batch]), np.append(fitness, feedback)
+    integers: Literal["centred", "widened"] = "centred" if space.mostly_integer else "widened"
+    cma_es = CmaEsSettings(sigma=_SIGMA, integers=integers)
+    search = CmaEs(cma_es, space, budget, random.seed())
+    best = np.argmin(fitness)
+    search.start_from(space.positions(designs[[best]]))
+    search.ask()
+    search.tell(fitness[[best]])
+    while True:
+        search.tell((yield search.ask()))
 
 
 def _most_promising(

@@ -123,17 +123,23 @@ _LARGEST_DIMENSION: Final = 64
 """Variables up to which CMA-ES is chosen; its decomposition costs the cube of the dimension."""
 
 
-def chosen_method(settings: AutoSettings, space: Space) -> SearchSettings:
-    """Choose the method of a search."""
+_FEW_EVALUATIONS: Final = 100
+"""Budget up to which Bayesian optimization is chosen, whose first designs come one by one."""
+
+
+def chosen_method(settings: AutoSettings, space: Space, budget: int) -> SearchSettings:
+    """Choose the method of a search by the numbers of variables and evaluations."""
     if space.dimension > _LARGEST_DIMENSION:
         return DeSettings(particles=settings.particles)
-    if 2 * np.count_nonzero(space.integer) > space.dimension:
+    if budget <= _FEW_EVALUATIONS:
+        return BayesianSettings(particles=settings.particles)
+    if space.mostly_integer:
         return CmaEsSettings(particles=settings.particles, sigma=0.1, integers="centred")
     return CmaEsSettings(particles=settings.particles)
 
 
 def _create_chosen(settings: AutoSettings, space: Space, budget: int, seed: int) -> Optimizer:
-    return create_search(chosen_method(settings, space), space, budget, seed)
+    return create_search(chosen_method(settings, space, budget), space, budget, seed)
 
 
 class RandomSearchSettings(SearchSettings):
@@ -157,14 +163,14 @@ def random_search(
 _BUILT_IN: Final[dict[str, Method]] = {
     "auto": Method(
         AutoSettings,
-        "CMA-ES, its settings by the share of integers, or differential evolution for more than 64"
-        " variables; chosen on submission",
+        "Bayesian for up to 100 evaluations, else CMA-ES, its settings by the share of integers, or"
+        " differential evolution for more than 64 variables; chosen on submission",
         _create_chosen,
         uses_start=True,
     ),
     "bayesian": from_generator(
         BayesianSettings,
-        "Gaussian process in a trust region, for few evaluations (TuRBO, Eriksson et al. 2019)",
+        "Gaussian process in a trust region (TuRBO, Eriksson et al. 2019), then CMA-ES",
         bayesian,
         libraries=("scipy",),
     ),

@@ -56,6 +56,11 @@ class Space:
         """Number of variables, d."""
         return len(self.axes)
 
+    @property
+    def mostly_integer(self) -> bool:
+        """Whether more than half of the variables are integers."""
+        return 2 * int(np.count_nonzero(self.integer)) > self.dimension
+
     def designs(self, positions: Floats) -> Floats:
         """Convert positions to (n, d) designs."""
         columns = np.array(positions, dtype=np.float64)

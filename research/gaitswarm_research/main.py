@@ -16,6 +16,7 @@ from gaitswarm_research.studies.accuracy import noise, steps, tables
 from gaitswarm_research.studies.controllers import controllers
 from gaitswarm_research.studies.drives import drives
 from gaitswarm_research.studies.precision import precision
+from gaitswarm_research.studies.preferences import preferences
 from gaitswarm_research.studies.worlds import worlds
 
 app = typer.Typer(
@@ -36,9 +37,10 @@ app.command()(bbob)
 app.command()(reconstruction)
 study = typer.Typer(
     no_args_is_help=True,
-    help="Measure effects of tables, time steps, noise, precision, controllers, worlds and drives.",
+    help="Measure effects of tables, time steps, noise, precision, controllers, worlds, drives and"
+    " preferences.",
 )
-for command in (tables, steps, noise, precision, controllers, worlds, drives):
+for command in (tables, steps, noise, precision, controllers, worlds, drives, preferences):
     study.command()(command)
 app.add_typer(study, name="study")
 

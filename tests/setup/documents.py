@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator
+from itertools import dropwhile
 
 from tests.documents.reader import BLOCK, SHELL
 from tests.examples.paths import ROOT
@@ -52,7 +53,7 @@ def _calls(line: str, program: str) -> Iterator[list[str]]:
             words = shlex.split(part.strip().rstrip(")"), comments=True)
         except ValueError:
             continue
-        words = [word for word in words if not re.fullmatch(r"[A-Z_]+=\S*", word)]
+        words = list(dropwhile(re.compile(r"[A-Z_]+=\S*").fullmatch, words))
         if words and words[0].rpartition("/")[2] == program:
             ends = [k for k, word in enumerate(words) if word in _ENDS]
             yield words[1 : ends[0] if ends else None]

@@ -77,6 +77,7 @@ class Embedded:
                     evaluations_planned=job.spec.budget,
                     iterations=job.progress.iterations,
                     evaluations=job.progress.evaluations,
+                    least_violation=job.progress.least_violation,
                 )
             ) as progress,
         ):
@@ -87,13 +88,21 @@ class Embedded:
                 if done.best is not None:
                     _, fitness = done.best
                     best = fitness if best is None else min(best, fitness)
-                progress.iteration(done.iteration, len(done.fitness), best, done.evaluate_seconds)
+                violations = done.violations
+                least = None if violations is None else float(violations.min())
+                progress.iteration(
+                    done.iteration, len(done.fitness), best, done.evaluate_seconds, least
+                )
 
             def followed(iteration: Iteration) -> None:
                 nonlocal best
                 best = iteration.best_so_far
                 progress.iteration(
-                    iteration.index, iteration.designs, best, iteration.evaluate_seconds
+                    iteration.index,
+                    iteration.designs,
+                    best,
+                    iteration.evaluate_seconds,
+                    iteration.least_violation,
                 )
 
             try:
@@ -241,7 +250,8 @@ def _resume_hint(job_id: str, place: str) -> str:
 
 def _report(job: JobView, verdict: VerdictView, place: str, others: Mapping[str, JobView]) -> Parts:
     if job.best is None:
-        yield "no design walks in every scenario"
+        closest = job.closest
+        yield "no design walks in every scenario" if closest is None else closest.explanation
     else:
         best = {name: other.best for name, other in others.items() if other.best is not None}
         evaluations = {"best": job.best} | best

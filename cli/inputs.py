@@ -113,6 +113,11 @@ def build_spec(options: SpecOptions) -> AnySpec:
     case = options.case
     if case is not None and (case[0:1] in "{@" or case.endswith(".json")):
         fields["case"] = json_object(case, "case")
+    constraints = constraint_choice(
+        fields.pop("constraint", None), fields.pop("no_worse_than", None)
+    )
+    if constraints is not None:
+        fields["constraints"] = constraints
     _merge_settings(fields, data.get("optimizer", {}))
     _merge_worlds(fields, data.get("worlds"))
     if (weights := fields.pop("scenario_weight", None)) is not None:
@@ -183,6 +188,28 @@ def optimizer_choice(name: str | None, settings: str | None) -> Any:
     fields["optimizer_settings"] = settings
     _merge_settings(fields, {})
     return fields["optimizer"]
+
+
+def constraint_choice(
+    limits: Sequence[str] | None, no_worse_than: str | None, *, none: bool = False
+) -> list[Any] | None:
+    """Return the unchecked field `constraints` of a spec; None unless any option was passed.
+
+    none: whether all constraints are lifted.
+    """
+    if none:
+        if limits or no_worse_than is not None:
+            raise InvalidRequest("cannot be combined with constraints", field="no-constraints")
+        return []
+    chosen: list[Any] = list(limits or ())
+    if no_worse_than is not None:
+        design = no_worse_than.startswith(("{", "-")) or no_worse_than.endswith(".json")
+        reference: Any = no_worse_than
+        if design:
+            content = json_object(no_worse_than, "no-worse-than")
+            reference = content.get("design", content)
+        chosen.append({"quantity": "*", "relative_to": reference, "max": 1.0})
+    return chosen or None
 
 
 def preference_choice(text: str) -> Any:

@@ -90,6 +90,12 @@ def completed_start(context: typer.Context, text: str | None) -> str | None:
         return text
 
 
+def completed_reference(context: typer.Context, text: str | None) -> str | None:
+    """Complete the prefix of a job's id; other references do not change."""
+    other = text is None or text.startswith(("published:", "{", "-")) or text.endswith(".json")
+    return text if other else completed_start(context, text)
+
+
 JobId = Annotated[
     str,
     typer.Argument(
@@ -169,6 +175,27 @@ ControllerOption = Annotated[
         help="Motor controller: fuzzy-pi, fuzzy-pi-3, p, pi, pid or, for torque-controlled"
         " actuators, joint-pd [default: that of the job or spec, else of the robot's folder, else"
         " fuzzy-pi].",
+    ),
+]
+
+ConstraintOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LIMIT",
+        help="Limit that a design must keep: speed>=0.05, slope-fast:speed>=0.03 (one scenario) or"
+        " energy<=0.9*published:A (relative to a published design or job:ID). Repeatable.",
+    ),
+]
+
+NoConstraints = Annotated[bool, typer.Option("--no-constraints", help="Lift all constraints.")]
+
+NoWorseThan = Annotated[
+    str | None,
+    typer.Option(
+        metavar="published:NAME|ID|FILE.json",
+        callback=completed_reference,
+        help="Design that f1 to f5 may not exceed in any scenario: a published one, a job's best,"
+        " or one of a file.",
     ),
 ]
 
@@ -253,6 +280,8 @@ class SpecOptions(GivenOptions):
     preference: Annotated[
         str | None, typer.Option(help="Weighting of objectives: A, B, C or chapter-3 (eq. 3.1).")
     ] = None
+    constraint: ConstraintOption = None
+    no_worse_than: NoWorseThan = None
     scenarios: Annotated[
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
     ] = None
@@ -269,7 +298,8 @@ class SpecOptions(GivenOptions):
         bool | None,
         typer.Option(
             "--with-gait",
-            help="Also search the gait: cycle time, stride, height, duty factor and FIR filter.",
+            help="Also search the gait: stride, height, duty factor, FIR filter and, unless the"
+            " scenarios differ in it, cycle time.",
         ),
     ] = None
     scenario_weight: Annotated[

@@ -30,6 +30,7 @@ class Progress:
     Attributes:
         particles: maximum of designs per iteration.
         iterations, evaluations: already committed.
+        least_violation: of the constraints so far; None without any.
         bar: on a terminal.
     """
 
@@ -38,6 +39,7 @@ class Progress:
     evaluations_planned: int
     iterations: int = 0
     evaluations: int = 0
+    least_violation: float | None = None
     bar: Bar | None = None
     _seen: int = field(default=0, init=False)
     _seconds: float = field(default=0.0, init=False)
@@ -56,23 +58,32 @@ class Progress:
         )
 
     def iteration(
-        self, index: int, designs: int, best_so_far: float | None, seconds: float
+        self,
+        index: int,
+        designs: int,
+        best_so_far: float | None,
+        seconds: float,
+        least_violation: float | None,
     ) -> None:
         """Show an iteration of so many designs, evaluated in so many seconds."""
+        known = [v for v in (self.least_violation, least_violation) if v is not None]
+        self.least_violation = min(known, default=None)
         self.iterations = index + 1
         self.evaluations += designs
         self._seen += designs
         self._seconds += seconds
         rate = self._seen / max(self._seconds, 1e-9)
         left = duration(max(0, self.evaluations_planned - self.evaluations) / rate)
-        spent, best, speed = self.spent, number(best_so_far), f"{rate:.1f} evaluations/s"
+        spent, best, speed = self.spent, f"best {number(best_so_far)}", f"{rate:.1f} evaluations/s"
+        if best_so_far is None and self.least_violation:
+            best = f"no feasible design yet, least violation {self.least_violation:.3g}"
         if self.bar is not None:
             self.bar.update(
                 self.bar.task_ids[0],
                 description=spent.unit.removesuffix("s"),
                 completed=spent.done,
                 total=spent.planned,
-                best=f"best {best}",
+                best=best,
                 rate=speed,
                 left=f"{left} left",
             )
@@ -84,7 +95,7 @@ class Progress:
         done = f"{spent.done}/{spent.planned} {spent.unit}"
         if spent.unit != "iterations":
             done = f"{index + 1} iterations, {done}"
-        note(f"{done}: best {best}, {speed}, {left} left")
+        note(f"{done}: {best}, {speed}, {left} left")
 
     def remark(self, text: str) -> None:
         """Show a line of text."""
@@ -133,7 +144,11 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
         for event in jobs.follow(job_id):
             if isinstance(event, IterationView):
                 progress.iteration(
-                    event.index, event.designs, event.best_so_far, event.evaluate_seconds
+                    event.index,
+                    event.designs,
+                    event.best_so_far,
+                    event.evaluate_seconds,
+                    event.least_violation,
                 )
             else:
                 last = event

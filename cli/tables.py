@@ -296,6 +296,7 @@ def job_parts(job: JobView) -> Parts:
         "simulated on": job.evaluated_on,
         "time left": time_left,
         "precision": job.precision,
+        "infeasible": str(job.infeasible) if job.least_violation is not None else None,
         "best fitness": number(job.best_fitness),
     }
     for record in job.provenance:
@@ -305,6 +306,8 @@ def job_parts(job: JobView) -> Parts:
     yield table(None, ((name, value) for name, value in rows.items() if value is not None))
     if job.best is not None:
         yield from best_parts(job.best, job)
+    elif job.closest is not None:
+        yield job.closest.explanation
 
 
 def best_parts(best: BestView, job: JobView) -> Parts:

@@ -53,10 +53,10 @@ class OptimizationResult:
 
         Returns:
             One row an iteration: index, designs (judged in it), best, mean, median, worst,
-            best_so_far (fitness, minimized, NaN where every design failed), failed (designs) and
-            evaluate_seconds [s].
+            best_so_far (fitness, minimized, NaN where no design has one), failed and infeasible
+            (designs), least_violation (NaN without constraints) and evaluate_seconds [s].
         """
-        whole = ("index", "designs", "failed")
+        whole = ("index", "designs", "failed", "infeasible")
         return Table(
             {
                 name: np.array(

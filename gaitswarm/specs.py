@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from gaitswarm.errors import invalid_request
 from gaitswarm.robots import read_text, robot_defaults
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
@@ -44,6 +45,9 @@ ScenarioInput: TypeAlias = str | Scenario | Document
 PreferenceInput: TypeAlias = PreferenceName | Preference | Document
 """A, B or C of table 4.5, chapter-3 (eq. 3.1), or a custom preference."""
 
+ConstraintInput: TypeAlias = str | Constraint | Document
+"""A limit that designs keep, such as "speed>=0.05", or a document as in docs/constraints.md."""
+
 StartInput: TypeAlias = str | os.PathLike[str] | Sequence[Document] | EarlierJobs | Document
 """Designs by name; a CSV file of them; or earlier jobs, by their ids separated by commas or as the
 document of `EarlierJobs`."""
@@ -68,6 +72,7 @@ class SpecOptions(TypedDict, total=False):
     variables: Sequence[str | Variable | Document]
     fixed: Mapping[str, float | str]
     preference: PreferenceInput
+    constraints: Sequence[ConstraintInput]
     optimizer: OptimizerName | OptimizerSettings | Document
     particles: int
     iterations: int
@@ -85,6 +90,7 @@ class ForkOptions(TypedDict, total=False):
 
     name: str
     preference: PreferenceInput
+    constraints: Sequence[ConstraintInput]
     optimizer: OptimizerName | OptimizerSettings | Document
     particles: int
     scenarios: ScenarioInput | Iterable[ScenarioInput]

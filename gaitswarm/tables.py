@@ -1,7 +1,8 @@
 """Results as tables: by column as numpy arrays, and as files in CSV or Parquet.
 
-A table of evaluations has the columns iteration, particle, fitness; `design.<variable>`, a number,
-or the name of a categorical variable's choice; and for every case `<case>.status`,
+A table of evaluations has the columns iteration, particle, fitness; of a job with constraints
+violation, 0 for a feasible design; `design.<variable>`, a number, or the name of a categorical
+variable's choice; and for every case `<case>.status`,
 `<case>.utility`, `<case>.<objective>` and `<case>.<measurement>`. What does not exist is NaN in an
 array, null in Arrow, Parquet and pandas, and empty in CSV; floats are exact to the bit.
 """
@@ -252,6 +253,9 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
         "particle": rows.particle,
         "fitness": _finite(rows.fitness),
     }
+    violations = spec.violations(rows.objectives, rows.failed)
+    if violations is not None:
+        columns["violation"] = _finite(violations)
     for variable, design in zip(spec.design_space().columns, rows.designs.T, strict=True):
         columns[f"design.{variable.name}"] = (
             np.array(variable.choices)[design.astype(np.intp)]

@@ -11,11 +11,14 @@ import typer
 
 from gaitswarm.cli.options import (
     AcceptChanges,
+    ConstraintOption,
     JobId,
     JobIds,
     JobName,
     Json,
+    NoConstraints,
     Notify,
+    NoWorseThan,
     Place,
     Priority,
     RobotOption,
@@ -214,15 +217,18 @@ def history(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
         if as_json:
             _print_history(job, jobs.history(job_id))
             return
+        constrained = job.least_violation is not None
         rows = [
             (
                 *(i.index, *map(number, (i.best_so_far, i.best, i.mean, i.median, i.worst))),
-                *(i.failed, f"{i.evaluate_seconds:.2f}"),
+                *(i.failed, *([i.infeasible, i.least_violation] if constrained else [])),
+                f"{i.evaluate_seconds:.2f}",
             )
             for i in jobs.iterations(job_id)
         ]
-    headings = (">iteration", "best so far", "best", "mean", "median", "worst", "failed", "seconds")
-    print_table(table(headings, rows))
+    headings = [">iteration", "best so far", "best", "mean", "median", "worst", "failed"]
+    headings += ["infeasible", "violation"] if constrained else []
+    print_table(table([*headings, "seconds"], rows))
 
 
 def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:
@@ -293,6 +299,9 @@ def fork(
     preference: Annotated[
         str | None, typer.Option(help="Weighting of objectives: A, B, C, chapter-3, or JSON.")
     ] = None,
+    constraint: ConstraintOption = None,
+    no_worse_than: NoWorseThan = None,
+    no_constraints: NoConstraints = False,
     optimizer: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Search method; `gaitswarm optimizers` lists all."),
@@ -338,6 +347,7 @@ def fork(
     """Queue a job that starts with iterations of another; omitted options keep its values."""
     from gaitswarm.cli.inputs import (
         chosen_robot,
+        constraint_choice,
         optimizer_choice,
         preference_choice,
         scenario_data,
@@ -346,6 +356,7 @@ def fork(
 
     values = {
         "preference": None if preference is None else preference_choice(preference),
+        "constraints": constraint_choice(constraint, no_worse_than, none=no_constraints),
         "optimizer": optimizer_choice(optimizer, optimizer_settings),
         "particles": particles,
         "scenarios": None if scenarios is None else scenario_data(scenarios, robot),

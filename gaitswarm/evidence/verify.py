@@ -361,8 +361,9 @@ def _search(evidence: Evidence) -> Answer:
     try:
         retraced(spec, evidence.job.budgets, evidence.asked, feedback)
     except ValueError as error:
-        if lineage is not None and lineage.carried == "search" and "preference" in lineage.changed:
-            return None, "its state was judged by another preference when it was forked"
+        measure = {"preference", "constraints"}
+        if lineage and lineage.carried == "search" and measure.intersection(lineage.changed):
+            return None, "its state was judged by another measure when it was forked"
         return False, f"{error}: other code, another seed, or other results"
     return True, f"{spec.search.name} proposes the same designs in {len(feedback)} iterations"
 

@@ -605,9 +605,12 @@ class Jobs(ABC):
         """
         job, best = self._service.job(job_id), self._service.store.best(job_id)
         if best is None:
+            closest = self._service.closest(job) if job.readable else None
             raise NotFound(
                 f"job {job_id} has no feasible design yet; try again after its next iteration, or"
                 " see why designs fail by its failures"
+                if closest is None
+                else f"job {job_id}: {closest.explanation}"
             )
         return BestView.from_evaluation(best, job.spec)
 
@@ -1073,4 +1076,5 @@ class Jobs(ABC):
 def job_view(service: JobService, job: Job) -> JobView:
     """Return the view of a job with its best design."""
     has_best = job.progress.best_fitness is not None
-    return JobView.from_job_and_best(job, service.store.best(job.id) if has_best else None)
+    best = service.store.best(job.id) if has_best else None
+    return JobView.from_job_and_best(job, best, service.closest(job) if job.readable else None)

@@ -28,6 +28,7 @@ from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import evaluations_of
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.masking import masked_url
@@ -238,13 +239,18 @@ def check_workers(evaluator: EvaluatorKind | Evaluator, cpus: int | None) -> Non
 
 def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
     """Raise Conflict if a spec differs from that of the job to resume in more than the name."""
-    before, wanted = stored.model_dump(), asked.resolved().model_dump()
+    before, wanted = (_submitted(spec).model_dump() for spec in (stored, asked.resolved()))
     changed = [f for f in before if f != "name" and before[f] != wanted.get(f)]
     if changed:
         raise Conflict(
             f"job {job_id} was submitted with another {', '.join(changed)}, which cannot change;"
             " resume it without a spec and options, or start a new one"
         )
+
+
+def _submitted(spec: Spec) -> Spec:
+    """Return a spec without what is looked up at submission."""
+    return spec.without_references() if isinstance(spec, JobSpec) else spec
 
 
 def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
@@ -265,13 +271,14 @@ def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) ->
 
     any_budget: whether its number of iterations may differ.
     """
-    wanted = spec.resolved()
+    wanted = _submitted(spec.resolved())
     for job in every(lambda after: service.store.jobs(search=spec.name, after=after)):
         if not job.readable or job.state is JobState.CANCELLED:
             continue
         budget = wanted.iterations
-        if job.spec != wanted and not (
-            any_budget and job.spec.with_budget(budget) == wanted.with_budget(budget)
+        stored = _submitted(job.spec)
+        if stored != wanted and not (
+            any_budget and stored.with_budget(budget) == wanted.with_budget(budget)
         ):
             continue
         with suppress(ProvenanceChanged):

@@ -13,6 +13,7 @@ from gaitswarm.services.optimizer.analysis.evaluations import (
     ObjectiveView,
     evaluation_views,
 )
+from gaitswarm.services.optimizer.analysis.feasibility import ClosestView
 from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -90,6 +91,14 @@ class IterationView(View):
         description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
     )
     failed: int = Field(description="Designs that failed in some scenario [1].", examples=[2])
+    infeasible: int = Field(
+        description="Designs that did not fail and violate a constraint [1].", examples=[0]
+    )
+    least_violation: Finite = Field(
+        description="Least violation of its designs, 0 for a feasible one [1]; null without"
+        " constraints, or if every design failed.",
+        examples=[None],
+    )
     evaluate_seconds: float = Field(description="Time of its evaluation [s].", examples=[1.23])
     committed_at: datetime = Field(description="When it was committed, UTC.")
     digest: str | None = Field(
@@ -190,8 +199,16 @@ class JobSummaryView(View):
     )
     best_fitness: Finite = Field(
         description="Least fitness so far, in double precision [1]; null while every design has"
-        " failed.",
+        " failed or violates a constraint.",
         examples=[21.3],
+    )
+    infeasible: int = Field(
+        default=0, description="Designs that did not fail and violate a constraint [1]."
+    )
+    least_violation: Finite = Field(
+        default=None,
+        description="Least violation of the constraints so far, 0 once a design is feasible [1];"
+        " null without constraints, or while every design has failed.",
     )
     reference: ReferenceView | None = Field(
         default=None,
@@ -297,7 +314,12 @@ class JobView(JobSummaryView):
 
     best: BestView | None = Field(
         description="Best design so far, judged in double precision; null while none walks in"
-        " every scenario."
+        " every scenario and keeps the constraints."
+    )
+    closest: ClosestView | None = Field(
+        default=None,
+        description="Design of least violation; null without constraints, and once a design is"
+        " feasible.",
     )
     objectives: list[ObjectiveView] = Field(description="What its designs minimize.")
     measurements: list[ObjectiveView] = Field(
@@ -331,7 +353,9 @@ class JobView(JobSummaryView):
         return self.stored_spec
 
     @classmethod
-    def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
+    def from_job_and_best(
+        cls, job: Job, best: Evaluation | None, closest: ClosestView | None = None
+    ) -> JobView:
         """Make a view of a job; its best design is not shown if the spec cannot be read."""
         view, spec = None, None
         columns: dict[str, list[ObjectiveView]] = {"objectives": [], "measurements": []}
@@ -346,6 +370,7 @@ class JobView(JobSummaryView):
             {
                 **_summary(job),
                 "best": view,
+                "closest": closest,
                 **columns,
                 "spec": spec,
                 "provenance": job.provenance,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
+from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, closest
 from gaitswarm.services.optimizer.analysis.fork import (
     Parent,
     check_begun,
@@ -15,8 +16,10 @@ from gaitswarm.services.optimizer.analysis.fork import (
     with_start_designs,
 )
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
+from gaitswarm.services.optimizer.analysis.reference import with_references
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
     MeasuredRates,
@@ -82,7 +85,7 @@ class JobService:
         if request is None:
             request = spec.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
-            with_start_designs(spec, self.job, self.columns),
+            self._resolved(spec),
             provenance=self.provenance(spec),
             request=request,
             seconds=seconds,
@@ -112,7 +115,9 @@ class JobService:
             ),
             last.digest,
         )
-        spec, fork = forked(parent, request, self.provenance, longest=self.longest_fork)
+        spec, fork = forked(
+            parent, request, self.provenance, self._referenced, longest=self.longest_fork
+        )
         seconds = self._check(spec)
         if sent is None:
             sent = request.model_dump(mode="json", exclude_unset=True)
@@ -129,11 +134,20 @@ class JobService:
         """Validate a job and store it claimed by this process."""
         self._check(spec)
         return self.store.create_claimed_job(
-            with_start_designs(spec, self.job, self.columns),
+            self._resolved(spec),
             runner_name(),
             lease_seconds=EMBEDDED_LEASE_SECONDS,
             provenance=self.provenance(spec),
         )
+
+    def _resolved(self, spec: Spec) -> Spec:
+        """Look up start designs and the references of constraints, once."""
+        started = with_start_designs(spec, self.job, self.columns)
+        return with_references(started, self.job, self.store.best, starts=True)
+
+    def _referenced(self, spec: AnySpec) -> AnySpec:
+        """Look up the references of constraints."""
+        return with_references(spec, self.job, self.store.best, starts=False)
 
     def recording(self, recording_id: str) -> RecordedWalk:
         return self.store.recordings([recording_id])[recording_id]
@@ -142,10 +156,17 @@ class JobService:
         """Estimate a job's cost from a measured simulation."""
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
-        return estimate(with_start_designs(spec, self.job, self.columns), cases, self._rates)
+        return estimate(self._resolved(spec), cases, self._rates)
 
     def job(self, job_id: str) -> Job:
         return self.store.job(job_id)
+
+    def closest(self, job: Job) -> ClosestView | None:
+        """Return the design of least violation; None without constraints or with a best design."""
+        progress = job.progress
+        if progress.least_violation is None or progress.best_fitness is not None:
+            return None
+        return closest(job.spec, self.store.closest(job.id), ended=job.state.terminal)
 
     def check_unchanged(self, job: Job) -> None:
         """Check that results computed here have the provenance of the job's earlier ones."""

@@ -14,6 +14,7 @@ from gaitswarm.services.optimizer.jobs.preference import exponential
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import (
     DesignValues,
+    Finite,
     IterationIndex,
     Particle,
     StatusName,
@@ -63,8 +64,15 @@ class EvaluationView(View):
     particle: Particle
     fitness: float | None = Field(
         description="Minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or mean"
-        " error of the fits (eq. 2.21) [A]; null if the design failed in any case.",
+        " error of the fits (eq. 2.21) [A]; null if the design failed in any case, or is"
+        " infeasible.",
         examples=[20.87],
+    )
+    violation: Finite = Field(
+        default=None,
+        description="Sum of the relative excesses over all limits of the constraints, 0 for a"
+        " feasible design [1]; null without constraints, or if the design failed.",
+        examples=[0.0],
     )
     figure_of_merit: float | None = Field(
         default=None,
@@ -93,20 +101,24 @@ def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, 
     space = spec.design_space()
     objectives = np.stack([evaluation.objectives for evaluation in evaluations])
     statuses = np.stack([evaluation.statuses for evaluation in evaluations])
-    logs = spec.judge(objectives, statuses != Status.OK).log_utilities
+    failed = statuses != Status.OK
+    logs = spec.judge(objectives, failed).log_utilities
+    violations = spec.violations(objectives, failed)
+    by_design = [None] * len(evaluations) if violations is None else violations.tolist()
     columns = [[c.name for c in columns] for columns in (spec.objectives, spec.measurements)]
     return [
         {
             "iteration": evaluation.iteration,
             "particle": evaluation.particle,
             "fitness": finite(evaluation.fitness),
+            "violation": violation,
             "figure_of_merit": spec.figure_of_merit(evaluation.fitness),
             "design": space.shown(evaluation.design.tolist()),
             "scenarios": case_results(
                 spec.case_names, columns, evaluation.statuses, evaluation.objectives, log_utilities
             ),
         }
-        for evaluation, log_utilities in zip(evaluations, logs, strict=True)
+        for evaluation, log_utilities, violation in zip(evaluations, logs, by_design, strict=True)
     ]
 
 

@@ -2,7 +2,7 @@
 
 change                   outcomes valid    search                       start of the fork
 only the budget          yes               continues                    the parent's iterations
-the preference           yes               continues, its memory        the parent's iterations,
+preference, constraints  yes               continues, its memory        the parent's iterations,
                                            rejudged if supported        rejudged
 any other                no, except for    new                          the best designs, if
                          optimizer, bounds                              designs are searched for
@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, zip_longest
 from typing import Any, Final
 
@@ -29,6 +29,7 @@ from gaitswarm.services.optimizer.errors import (
     InvalidRequest,
     ProvenanceChanged,
 )
+from gaitswarm.services.optimizer.jobs.constraints import feasible_first
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
 from gaitswarm.services.optimizer.jobs.fork import (
@@ -101,7 +102,9 @@ def with_start_designs(
         try:
             job = job_of(job_id)
             space, count = job.spec.design_space(), spec.start.count
-            best = list(best_designs(space, columns_of(job), searched, count))
+            columns = columns_of(job)
+            order = _ordered(job.spec, columns, columns.fitness)
+            best = list(best_designs(space, columns.designs, order, searched, count))
             if not best:
                 raise InvalidRequest(f"job {job_id} has no successful design")
             _check(spec, best)
@@ -121,18 +124,24 @@ def with_start_designs(
 
 
 def best_designs(
-    space: DesignSpace, columns: EvaluationColumns, searched: tuple[str, ...], count: int
+    space: DesignSpace, designs: Floats, order: Floats, searched: tuple[str, ...], count: int
 ) -> Iterator[Design]:
-    """Yield the best distinct designs of a job."""
+    """Yield the best distinct designs (r, v) of a job by ascending order (r,)."""
     seen = set[tuple[float | str, ...]]()
-    for row in np.argsort(columns.fitness, kind="stable").tolist():
-        if len(seen) == count or not np.isfinite(columns.fitness[row]):
+    for row in np.argsort(order, kind="stable").tolist():
+        if len(seen) == count or not np.isfinite(order[row]):
             return
-        shown = space.shown(columns.designs[row].tolist())
+        shown = space.shown(designs[row].tolist())
         design = {name: shown[name] for name in searched if name in shown}
         if tuple(design.values()) not in seen:
             seen.add(tuple(design.values()))
             yield design
+
+
+def _ordered(spec: Spec, columns: EvaluationColumns, fitness: Floats) -> Floats:
+    """Return numbers (r,) that order designs: by fitness, infeasible ones by violation."""
+    violations = spec.violations(columns.objectives, columns.failed)
+    return fitness if violations is None else feasible_first(fitness, violations)
 
 
 def _check(spec: Spec, designs: list[Design]) -> None:
@@ -144,8 +153,14 @@ def _check(spec: Spec, designs: list[Design]) -> None:
         raise ValueError(f"{name} of its best design no. {int(number) + 1}: {problem}") from error
 
 
-_OUTCOMES_HOLD: Final = frozenset({"preference", "optimizer", "variables"})
+_OUTCOMES_HOLD: Final = frozenset({"preference", "constraints", "optimizer", "variables"})
 """Fields of a spec that do not affect outcomes."""
+
+_MEASURE: Final = frozenset({"preference", "constraints"})
+"""Those by which outcomes are judged."""
+
+_REFERENCES_DEPEND_ON: Final = frozenset({"constraints", "scenarios", "robot"})
+"""Fields of a request on which the values of references depend."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,15 +206,19 @@ def forked(
     parent: Parent,
     request: ForkRequest,
     provenance: Callable[[AnySpec], JobProvenance],
+    look_up: Callable[[AnySpec], AnySpec] = lambda spec: spec,
     *,
     longest: float = math.inf,
 ) -> tuple[AnySpec, Fork]:
     """Return the spec and origin of a fork.
 
+    look_up: returns a spec whose constraints have the values of their references.
     longest: limit on the time to restore the search [s].
     """
     before = parent.job.spec
     spec = forked_spec(before, request)
+    if _REFERENCES_DEPEND_ON.intersection(changed_fields(before, spec)):
+        spec = look_up(spec)
     changed = changed_fields(before, spec)
     lineage = Lineage(
         parent=parent.job.id,
@@ -208,9 +227,9 @@ def forked(
         changed=changed,
         digest=parent.digest,
     )
-    fitness = parent.columns.fitness
-    if "preference" in changed and _OUTCOMES_HOLD.issuperset(changed):
-        fitness = spec.judge(parent.columns.objectives, parent.columns.failed).fitness
+    fitness, judge = parent.columns.fitness, before
+    if _MEASURE.intersection(changed) and _OUTCOMES_HOLD.issuperset(changed):
+        fitness, judge = spec.judge(parent.columns.objectives, parent.columns.failed).fitness, spec
     reason = _reason_for_new_search(before, changed)
     if not reason:
         try:
@@ -245,7 +264,7 @@ def forked(
             _check_unchanged(parent, taken, provenance(spec))
             update = {"evaluations": len(fitness), "budgets": budgets_of(parent.job)}
             return spec, Fork(lineage.model_copy(update=update), taken)
-    return _from_best_designs(parent, spec, fitness, request, reason), Fork(
+    return _from_best_designs(parent, spec, judge, fitness, request, reason), Fork(
         lineage.model_copy(update={"carried": "designs", "reason": reason})
     )
 
@@ -259,8 +278,8 @@ def _reason_for_new_search(parent: AnySpec, changed: Sequence[str]) -> str:
         return "the parent searched within other bounds"
     if "optimizer" in changed:
         return "another search method or other settings cannot continue the parent's search"
-    if "preference" in changed and parent.precision == "single":
-        return "the best design by another preference was not reevaluated in double precision"
+    if _MEASURE.intersection(changed) and parent.precision == "single":
+        return "the best design by another measure was not reevaluated in double precision"
     return ""
 
 
@@ -316,17 +335,23 @@ def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) ->
 
 
 def _from_best_designs(
-    parent: Parent, spec: AnySpec, fitness: Floats, request: ForkRequest, reason: str
+    parent: Parent,
+    spec: AnySpec,
+    judge: AnySpec,
+    fitness: Floats,
+    request: ForkRequest,
+    reason: str,
 ) -> AnySpec:
     if not spec.searches:
         raise InvalidRequest(
             f"{reason}, and a job of kind {spec.kind} samples its designs, so it cannot start from"
             " the best of another job; submit a new job instead"
         )
-    columns = replace(parent.columns, fitness=fitness)
     searched = tuple(variable.name for variable in spec.design_space().variables)
     count = min(request.start_count, spec.budget)
-    designs = tuple(best_designs(parent.job.spec.design_space(), columns, searched, count))
+    space, columns = parent.job.spec.design_space(), parent.columns
+    order = _ordered(judge, columns, fitness)
+    designs = tuple(best_designs(space, columns.designs, order, searched, count))
     if not designs:
         raise Conflict(
             f"every design of job {parent.job.id} in these iterations has failed;"

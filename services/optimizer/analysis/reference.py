@@ -1,35 +1,53 @@
-"""Simulation of a job's reference design, for the gain of its best design"""
+"""Reference designs: simulated for the gain of a job's best design, and for its constraints"""
 
 from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 from pydantic import Field
 
-from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.errors import (
+    GaitswarmError,
+    InvalidRequest,
+    StoreUnavailable,
+)
+from gaitswarm.services.optimizer.jobs.constraints import (
+    PUBLISHED,
+    Constraint,
+    ReferenceChoice,
+)
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import by_design
 from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
 from gaitswarm.services.optimizer.jobs.reference import (
     START,
     Reference,
     ReferenceKind,
+    adapted_to_job,
     reference_design,
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import Finite, View
-from gaitswarm.sim.case import Walk, run_together
-from gaitswarm.sim.errors import SimulationError
-from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.worlds.walks import PerturbedWalk
+from gaitswarm.sim.case import run_together
+from gaitswarm.sim.catalogue import design_numbers
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationError, SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_VARIABLES
+from gaitswarm.sim.near_names import instead_of
+from gaitswarm.sim.outcome import Outcome, Status
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
+
+S = TypeVar("S", bound=Spec)
 
 NONE: Final = Reference(None, None)
 """For a job with a plug-in's case."""
@@ -37,7 +55,7 @@ NONE: Final = Reference(None, None)
 _JUDGED_BY: Final = frozenset(
     {
         *("robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"),
-        *("scenario_weights", "scenario_aggregate"),
+        *("scenario_weights", "scenario_aggregate", "case"),
     }
 )
 """Fields of a spec on which a reference depends."""
@@ -83,18 +101,145 @@ def _walked(judged_by: str) -> Reference:
     if reference is None:
         return NONE
     name, kind, design = reference
-    cases = [
-        replace(case, variables=tuple(design), precision="double")
-        for case in spec.cases({})
-        if isinstance(case, Walk | PerturbedWalk)
-    ]
-    row = np.array([list(design.values())])
-    outcomes = run_together(cases, [row] * len(cases))
-    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
-    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+    outcomes = _simulated(judged_by, spec.controller, tuple(design.items()))
+    objectives, failed = by_design(outcomes)
     fitness = float(spec.judge(objectives, failed).fitness[0])
     results = objectives[0].astype("<f8").tobytes()
     return Reference(name, fitness if math.isfinite(fitness) else None, kind, results)
+
+
+@lru_cache(maxsize=64)
+def _simulated(
+    judged_by: str, controller: ControllerName, design: tuple[tuple[str, float], ...]
+) -> tuple[Outcome, ...]:
+    """Simulate a design of any controller in the cases of a job, in double precision."""
+    spec = JobSpec.model_validate_json(judged_by)
+    cases = spec.cases_of(controller, tuple(name for name, _ in design))
+    return run_together(cases, [np.array([[value for _, value in design]])] * len(cases))
+
+
+def with_references(
+    spec: S,
+    job_of: Callable[[str], Job],
+    best_of: Callable[[str], Evaluation | None],
+    *,
+    starts: bool,
+) -> S:
+    """Return a spec whose constraints have the values of their references.
+
+    The references are simulated in the job's cases, in double precision.
+
+    starts: whether a job without start designs starts from the references, which keep constraints
+    that are relative to them.
+
+    Raises InvalidRequest, which names the constraint.
+    """
+    if not isinstance(spec, JobSpec) or not spec.constraints:
+        return spec
+    constraints, start = [], list[dict[str, float | str]]()
+    for index, constraint in enumerate(spec.constraints):
+        values = None
+        try:
+            if constraint.relative_to is not None:
+                controller, design = _referred(spec, constraint.relative_to, job_of, best_of)
+                values = _values(spec, constraint, controller, design)
+                nearest = _nearest(spec, design) if controller == spec.controller else None
+                start += [nearest] if starts and nearest and nearest not in start else []
+        except (GaitswarmError, SimulationError, ValueError) as error:
+            message = str(error).removeprefix("relative_to: ")
+            field = f"constraints.{index}.relative_to"
+            raise InvalidRequest(message, field=field) from error
+        constraints.append(constraint.model_copy(update={"reference": values}))
+    changes = {
+        "constraints": tuple(constraints),
+        "start": spec.start or tuple(start[: spec.budget]),
+    }
+    resolved = spec.model_copy(update=changes)
+    try:
+        resolved.limits()
+    except ValueError as error:
+        field, _, message = str(error).partition(": ")
+        raise InvalidRequest(message, field=field) from error
+    return resolved
+
+
+def _values(
+    spec: JobSpec,
+    constraint: Constraint,
+    controller: ControllerName,
+    design: Mapping[str, float],
+) -> dict[str, dict[str, float]]:
+    """Simulate a reference and return its values by case and quantity."""
+    outcomes = _simulated(
+        spec.model_dump_json(include=set(_JUDGED_BY)), controller, tuple(design.items())
+    )
+    values: dict[str, dict[str, float]] = {}
+    for case, column in spec.constraint_cases.limited(constraint):
+        name, status = spec.case_names[case], Status(outcomes[case].statuses[0])
+        if status is not Status.OK:
+            raise ValueError(f"it fails in {name}: {status.phrase}")
+        value = float(outcomes[case].objectives[0, column])
+        values.setdefault(name, {})[spec.columns[column].name] = value
+    return values
+
+
+def _referred(
+    spec: JobSpec,
+    reference: ReferenceChoice,
+    job_of: Callable[[str], Job],
+    best_of: Callable[[str], Evaluation | None],
+) -> tuple[ControllerName, Mapping[str, float]]:
+    """Return the controller and the design of a reference."""
+    law = CONTROLLERS[spec.controller]
+    if not isinstance(reference, str):
+        return spec.controller, _complete_design(spec, reference)
+    if reference.startswith(PUBLISHED):
+        name = reference.removeprefix(PUBLISHED)
+        if name not in law.published:
+            raise ValueError(
+                f"no published design {name!r} of {spec.controller};"
+                f" {instead_of(name, law.published)}"
+            )
+        return spec.controller, adapted_to_job(law.published[name], spec)
+    other, best = job_of(reference).spec, best_of(reference)
+    if not isinstance(other, JobSpec):
+        raise InvalidRequest(f"job {reference} is of kind {other.kind}, which tunes no controller")
+    if best is None:
+        raise ValueError(f"job {reference} has no feasible design yet")
+    space = other.design_space()
+    (values,) = space.simulated(best.design[np.newaxis]).tolist()
+    return other.controller, dict(zip(space.names, values, strict=True))
+
+
+def _nearest(spec: JobSpec, design: Mapping[str, float]) -> dict[str, float | str] | None:
+    """Return the design of a job that is nearest to a reference; None if there is none.
+
+    A gait that the reference leaves to the scenario is that of the first one.
+    """
+    gait, nearest = spec.resolved_scenarios()[0].model_dump(), dict[str, float | str]()
+    for variable in spec.design_space().variables:
+        value = design.get(variable.name, gait.get(variable.name))
+        if value is None:
+            return None
+        number = min(max(variable.number(value), variable.low), variable.high)
+        nearest[variable.name] = variable.shown(number)
+    return nearest
+
+
+def _complete_design(spec: JobSpec, design: Mapping[str, float | str]) -> dict[str, float]:
+    """Check a design; conventions and gait that it omits are those of the job."""
+    law = CONTROLLERS[spec.controller]
+    known = [v.name for v in (*law.variables, *law.conventions, *GAIT_VARIABLES)]
+    for name in design:
+        if name not in known:
+            raise ValueError(f"unknown variable {name!r}; {instead_of(name, known)}")
+    missing = [v.name for v in law.variables if v.name not in design]
+    if missing:
+        raise ValueError(f"the design has no {', '.join(missing)}")
+    try:
+        return adapted_to_job({}, spec) | design_numbers(spec.controller, design)
+    except SimulationInputError as error:
+        raise ValueError(str(error)) from error
 
 
 def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:

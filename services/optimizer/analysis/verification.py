@@ -192,6 +192,7 @@ class _Summary:
     """Summary values derived from fitness, of every iteration and of the job."""
 
     def __init__(self, job: Job) -> None:
+        self._job = job
         self._progress = job.progress
         self._single = job.readable and job.spec.precision != "double"
         self._readable = job.readable
@@ -217,7 +218,8 @@ class _Summary:
             best = None if reevaluation is None or particle is None else reevaluation.fitness
         elif particle is not None:
             best = float(columns.fitness[particle])
-        expected = fitness_summary(columns.fitness, best, self._best)
+        violations = self._job.spec.violations(columns.objectives, columns.failed)
+        expected = fitness_summary(columns.fitness, best, self._best, violations)
         for name, value in expected.items():
             if not _same(value, link.summary[name]):
                 raise BrokenChain(index, f"its {name} does not follow from its fitness")

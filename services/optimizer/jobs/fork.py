@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
@@ -21,7 +22,9 @@ from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import ScenarioChoice
 from gaitswarm.sim.variables import VariableName
 
-_SPEC_FIELDS: Final = ("name", "preference", "optimizer", "scenarios", "robot", "iterations")
+_SPEC_FIELDS: Final = (
+    *("name", "preference", "constraints", "optimizer", "scenarios", "robot", "iterations"),
+)
 """Fields of a request that are also fields of a spec."""
 
 _FREE: Final = frozenset({"name", "iterations"})
@@ -44,6 +47,11 @@ class ForkRequest(BaseModel):
     )
     preference: PreferenceChoice | None = Field(
         default=None, description="Weights of the objectives; null: the parent's."
+    )
+    constraints: Constraints | None = Field(
+        default=None,
+        description="Limits that a design must keep, as in a spec; null: the parent's.",
+        examples=[["speed>=0.05"]],
     )
     optimizer: OptimizerChoice | None = Field(
         default=None, description="Search method and its settings; null: the parent's."

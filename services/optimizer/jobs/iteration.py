@@ -15,8 +15,10 @@ from gaitswarm.sim.outcome import Outcome, Status
 
 Floats = NDArray[np.float64]
 
-SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
-"""Columns of an iteration computed from its fitness."""
+SUMMARY: Final = (
+    *("best", "mean", "median", "worst", "best_so_far", "failed", "infeasible", "least_violation"),
+)
+"""Columns of an iteration computed from its fitness and violations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +104,9 @@ class Iteration:
     worst: float | None
     best_so_far: float | None  # least fitness of this and all earlier iterations
     failed: int  # number of designs that failed in at least one case
+    infeasible: int  # number of other designs that violate a constraint
+    # of all its designs, 0 for a feasible one; None without constraints or if all failed
+    least_violation: float | None
     evaluate_seconds: float  # duration of the evaluation [s]
     committed_at: datetime  # UTC
     digest: str | None = None
@@ -152,6 +157,7 @@ class CompletedIteration:
     # is not cached
     keys: tuple[bytes | None, ...] = ()
     evaluated_on: str | None = None  # where it was simulated, for people; None if unknown
+    violations: Floats | None = None  # (n,) see `Spec.violations`
 
     @property
     def columns(self) -> EvaluationColumns:
@@ -191,12 +197,23 @@ def best_particle(fitness: Floats) -> int | None:
 
 
 def fitness_summary(
-    fitness: Floats, best: float | None, best_before: float | None
+    fitness: Floats,
+    best: float | None,
+    best_before: float | None,
+    violations: Floats | None = None,
 ) -> dict[str, Any]:
-    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none."""
+    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none.
+
+    violations: of `Spec.violations`.
+    """
     finite = fitness[np.isfinite(fitness)]
     summary: dict[str, Any] = dict.fromkeys(SUMMARY)
-    summary["failed"] = len(fitness) - len(finite)
+    summary["infeasible"] = 0
+    if violations is not None:
+        known = violations[np.isfinite(violations)]
+        summary["infeasible"] = int(np.count_nonzero(known))
+        summary["least_violation"] = float(known.min()) if len(known) else None
+    summary["failed"] = len(fitness) - len(finite) - summary["infeasible"]
     bests = [value for value in (best, best_before) if value is not None]
     summary["best_so_far"] = min(bests, default=None)
     if len(finite):

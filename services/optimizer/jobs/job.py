@@ -185,6 +185,8 @@ class Progress:
     best_particle: int | None = None
     compute_seconds: float = 0.0  # time spent evaluating [s]
     evaluations_saved: int = 0  # designs whose outcome was cached
+    infeasible: int = 0  # designs that violate a constraint and have not failed
+    least_violation: float | None = None  # as in `Iteration`, of all iterations
     # moving average of the time per design [s], see `recent_pace`; None if unknown
     recent_seconds: float | None = None
     head: str | None = None  # digest of the last iteration; None if there is none

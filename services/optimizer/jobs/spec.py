@@ -350,6 +350,18 @@ class Spec(BaseModel):
             failed: (n, K), true for a case without a result.
         """
 
+    def violations(self, results: Floats, failed: NDArray[np.bool_]) -> Floats | None:
+        """Return by how much n designs violate the job's constraints (n,).
+
+        0 for a feasible design, +inf for one without fitness. None for a job without constraints.
+
+        Args:
+            results: (n, K, m) raw results.
+            failed: (n, K), true for a case without a result.
+        """
+        del results, failed  # Used by kinds with constraints.
+        return None
+
     def search_feedback(
         self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats
     ) -> Floats:

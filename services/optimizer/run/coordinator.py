@@ -52,6 +52,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     Reevaluation,
 )
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, refusal
+from gaitswarm.services.optimizer.jobs.preference import by_design
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.jobs.spec import Spec, judge_outcomes
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
@@ -331,7 +332,8 @@ def _evaluate(state: Coordination) -> Decision:
 
 def _complete(state: Coordination, event: Evaluated) -> Decision:
     job, ask, _ = _current(state)
-    fitness = judge_outcomes(job.spec, event.outcomes).fitness
+    results = by_design(event.outcomes)
+    fitness = job.spec.judge(*results).fitness
     done = CompletedIteration(
         iteration=ask.iteration,
         designs=job.spec.design_space().designs(ask.positions),
@@ -340,6 +342,7 @@ def _complete(state: Coordination, event: Evaluated) -> Decision:
         evaluate_seconds=event.seconds,
         precision=job.spec.precision,
         keys=event.keys,
+        violations=job.spec.violations(*results),
     )
     state = replace(state, done=done, failures=0)
     if done.precision != "double" and fitness.min() < state.best_fitness:

@@ -130,6 +130,15 @@ class History(Aggregate):
         best = None if columns is None else evaluations_of(columns)[particle]
         return best and replace(best, reevaluation=again[0][1] if again else None)
 
+    def closest(self, job_id: str) -> tuple[Evaluation, ...]:
+        """Return the earliest iteration of least violation; empty if there is none."""
+        of_job = iterations.c.job_id == job_id, iterations.c.least_violation.is_not(None)
+        first = (iterations.c.least_violation, iterations.c.iteration)
+        query = select(iterations.c.iteration).where(*of_job).order_by(*first).limit(1)
+        with self._database.read("closest") as connection:
+            iteration = connection.execute(query).scalar()
+        return () if iteration is None else self.evaluations(job_id, iteration)
+
     def reevaluations(
         self, job_id: str, first: int = 0, last: int = _LARGEST_INDEX
     ) -> tuple[tuple[int, Reevaluation], ...]:
@@ -330,11 +339,12 @@ def _results(
     before = job["head"] or documents.digest
     digest = iteration_digest(before, documents, link, columns, done.reevaluation)
     particle, best = done.best or (None, None)
+    summary = fitness_summary(done.fitness, best, job["best_fitness"], done.violations)
     committed = {
         "committed_at": now,
         "evaluate_seconds": done.evaluate_seconds,
         "digest": digest,
-        **fitness_summary(done.fitness, best, job["best_fitness"]),
+        **summary,
     }
     place = {"job_id": job["id"], "iteration": done.iteration}
     keys = done.keys or [None] * len(columns)
@@ -353,7 +363,11 @@ def _results(
         "head": digest,
         "iterations": done.iteration + 1,
         "evaluations": job["evaluations"] + len(columns),
+        "infeasible": job["infeasible"] + summary["infeasible"],
     }
+    least, least_before = summary["least_violation"], job["least_violation"]
+    if least is not None and (least_before is None or least < least_before):
+        changes["least_violation"] = least
     if best is not None and (job["best_fitness"] is None or best < job["best_fitness"]):
         changes |= {"best_fitness": best, "best_iteration": done.iteration}
         changes |= {"best_particle": particle}
@@ -408,7 +422,7 @@ def take_history(
 
     Returns columns of the fork's row. Raises Conflict if the parent is gone.
     """
-    parent, end, precision = lineage.parent, lineage.from_iteration, to_job(job).spec.precision
+    parent, end, spec = lineage.parent, lineage.from_iteration, to_job(job).spec
     provenance = provenance_document(taken.provenance)
     documents = ChainDocuments(parsed(job["spec"]), parsed(job["lineage"]), provenance)
     changes: dict[str, Any] = {
@@ -439,8 +453,9 @@ def take_history(
                 ),
                 of_parent.fitness if taken.fitness is None else taken.fitness[index],
                 evaluate_seconds=0.0,
-                precision=precision,
+                precision=spec.precision,
                 reevaluation=reevaluated.get(index),
+                violations=spec.violations(of_parent.objectives, of_parent.failed),
             )
             changed, results = _results({**job, **changes}, documents, link, done, now)
             changes |= changed

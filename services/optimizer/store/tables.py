@@ -86,6 +86,9 @@ jobs: Final = sa.Table(
     sa.Column("best_fitness", sa.Double),
     sa.Column("best_iteration", sa.Integer),
     sa.Column("best_particle", sa.Integer),
+    # `Progress.infeasible` and `Progress.least_violation`.
+    sa.Column("infeasible", sa.BigInteger, nullable=False, server_default="0"),
+    sa.Column("least_violation", sa.Double),
     sa.Column("compute_seconds", sa.Double, nullable=False, default=0.0),
     # Iterations to run if the job was extended; the spec stays as submitted.
     sa.Column("budget", sa.Integer),
@@ -163,7 +166,8 @@ iterations: Final = sa.Table(
     # failed.
     sa.Column("committed_at", UtcDateTime),
     *(sa.Column(n, sa.Double) for n in ("best", "mean", "median", "worst", "best_so_far")),
-    sa.Column("failed", sa.Integer),
+    *(sa.Column(n, sa.Integer) for n in ("failed", "infeasible")),
+    sa.Column("least_violation", sa.Double),
     sa.Column("evaluate_seconds", sa.Double),
     # Of positions and state, and of the committed iteration, chained to the previous one.
     sa.Column("ask_digest", sa.Text),

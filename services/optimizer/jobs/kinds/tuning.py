@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
@@ -14,6 +15,13 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
+from gaitswarm.services.optimizer.jobs.constraints import (
+    Cases,
+    Constraints,
+    Limit,
+    feasible_first,
+    violations,
+)
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.designs import Scenarios
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
@@ -160,6 +168,7 @@ class JobSpec(WalksSpec):
         "preference",
         "scenario_weights",
         "scenario_aggregate",
+        "constraints",
     }
 
     kind: Literal["tuning"] = Field(default="tuning", description="Tune a motor controller.")
@@ -178,6 +187,7 @@ class JobSpec(WalksSpec):
         description="Weights of the objectives: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
         " a custom preference.",
     )
+    constraints: Constraints = ()
     case: CaseChoice = Field(
         default=None,
         description="Evaluator of designs in each scenario: a plug-in's case, by name or with"
@@ -222,7 +232,40 @@ class JobSpec(WalksSpec):
         if self.case is not None and self.precision != "double":
             raise ValueError(f"precision: {self.case.name} has its own precision; omit it")
         self.design_space()
+        self.limits(known=False)
         return self
+
+    def limits(self, *, known: bool = True) -> list[Limit]:
+        """Return the limits of the constraints by case and quantity.
+
+        Args:
+            known: Whether the values of all references are; they are looked up at submission. If
+                false, limits without them are left out.
+
+        Raises:
+            ValueError: A constraint names an unknown quantity or scenario, contradicts another, or
+                lacks the values of its reference; names the constraint.
+        """
+        if not self.constraints:
+            return []
+        try:
+            return self.constraint_cases.limits(self.constraints, known=known)
+        except ValueError as error:
+            raise ValueError(f"constraints.{error}") from error
+
+    @property
+    def constraint_cases(self) -> Cases:
+        """Cases and columns that constraints may name."""
+        worlds = 1 if self.worlds is None else self.worlds.count
+        scenarios = [s.name for s in self.resolved_scenarios() for _ in range(worlds)]
+        return Cases(self.case_names, scenarios, self.columns)
+
+    def without_references(self) -> JobSpec:
+        """Return the job without the values of references and the start from them."""
+        bare = [c.model_copy(update={"reference": None}) for c in self.constraints]
+        relative = any(c.relative_to is not None for c in bare)
+        start = () if relative else self.start
+        return self.model_copy(update={"constraints": tuple(bare), "start": start})
 
     def design_space(self) -> DesignSpace:
         """Return the controller's variables, and chosen ones of its conventions and of the gait."""
@@ -235,9 +278,14 @@ class JobSpec(WalksSpec):
         )
 
     def with_gait_searched(self) -> JobSpec:
-        """Return the job with chapter 3's gait variables searched as well, unless fixed."""
+        """Return the job with chapter 3's gait variables searched as well, unless fixed.
+
+        A cycle time in which the scenarios differ stays theirs: it makes them fast or slow.
+        """
         space = self.design_space()
-        added = tuple(name for name in GAIT_OF_CHAPTER_3 if name not in space.names)
+        cycle_times = {scenario.cycle_time for scenario in self.resolved_scenarios()}
+        names = GAIT_OF_CHAPTER_3 if len(cycle_times) == 1 else GAIT_OF_CHAPTER_3[1:]
+        added = tuple(name for name in names if name not in space.names)
         document = self.model_dump() | {"variables": (*space.variables, *added)}
         return JobSpec.model_validate(document)
 
@@ -290,18 +338,26 @@ class JobSpec(WalksSpec):
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
         """Return one case for each scenario, or for each world in each scenario."""
-        names = self.design_space().names
+        return self.cases_of(self.controller, self.design_space().names)
+
+    def cases_of(self, controller: ControllerName, names: tuple[str, ...]) -> tuple[Case, ...]:
+        """Return the cases for designs of any controller.
+
+        Args:
+            controller: Of the designs.
+            names: Of their variables, in the order of the columns.
+        """
         if self.worlds is not None:
             pairs = product(self.resolved_scenarios(), self.worlds.drawn())
             return tuple(
                 MeasuredPerturbedWalk(
-                    name, self.robot, self.controller, scenario, world, names, self.precision
+                    name, self.robot, controller, scenario, world, names, self.precision
                 )
                 for name, (scenario, world) in zip(self.case_names, pairs, strict=True)
             )
         walk = MeasuredWalk if self.case is None else Walk
         walks = tuple(
-            walk(self.robot, self.controller, scenario, names, self.precision)
+            walk(self.robot, controller, scenario, names, self.precision)
             for scenario in self.resolved_scenarios()
         )
         return walks if self.case is None else tuple(create_case(self.case, w) for w in walks)
@@ -325,26 +381,52 @@ class JobSpec(WalksSpec):
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
         """Return fitness and utilities of n designs, aggregated as the job says.
 
+        A design that violates a constraint has no fitness.
+
         Args:
-            objectives: (n, K, m) raw objectives.
+            objectives: (n, K, m) raw results.
             failed: (n, K), true for a case without a result.
         """
+        judged = self._unconstrained(objectives, failed)
+        if not self.constraints:
+            return judged
+        infeasible = violations(self.limits(), objectives) > 0.0
+        return replace(judged, fitness=np.where(infeasible, np.inf, judged.fitness))
+
+    def _unconstrained(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
         judged = super().judge(objectives, failed)
         aggregation = self.aggregation
         return judged if aggregation is None else aggregation.judged(judged.log_utilities)
+
+    def violations(self, results: Floats, failed: NDArray[np.bool_]) -> Floats | None:
+        """Return by how much n designs violate the constraints, as `Spec.violations` says."""
+        if not self.constraints:
+            return None
+        fitness = self._unconstrained(results, failed).fitness
+        return np.where(np.isfinite(fitness), violations(self.limits(), results), np.inf)
 
     def search_feedback(
         self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats
     ) -> Floats:
         """Return the fitness; for a multi-objective method f1 to f5 over all scenarios.
 
-        These depend on no preference, so neither does the path of such a search.
+        These depend on no preference, so neither does the path of such a search. With constraints,
+        every infeasible design has numbers beyond those of all feasible ones, increasing with its
+        violation: feasible designs dominate infeasible ones, and these compare by violation.
         """
-        if not METHODS[self.search.name].multi_objective:
-            return fitness
-        if self.aggregation is None:
-            return objective_vectors(objectives, failed)
-        return objective_vectors(objectives, failed, aggregate=self.aggregation.aggregated)
+        feedback = fitness
+        if METHODS[self.search.name].multi_objective:
+            feedback = (
+                objective_vectors(objectives, failed)
+                if self.aggregation is None
+                else objective_vectors(objectives, failed, aggregate=self.aggregation.aggregated)
+            )
+        violation = self.violations(objectives, failed)
+        if violation is None:
+            return feedback
+        columns = feedback.reshape(len(violation), -1).T
+        ordered = [feasible_first(column, violation) for column in columns]
+        return np.stack(ordered, axis=1).reshape(feedback.shape)
 
     def resolved(self) -> JobSpec:
         """Return the job with scenarios, preference, variables and optimizer written out."""

@@ -15,13 +15,17 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from benchmarks.large_store import fill
 from gaitswarm.services.optimizer.analysis.distribution import distribution
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
-from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, rank
+from gaitswarm.services.optimizer.analysis.ranking import rank
+from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
 
 ROW_BY_ROW = 100
@@ -37,12 +41,18 @@ def variants(store: Store, job: Job) -> dict[str, tuple[Callable[[], object], fl
     part = columns.rows(slice(some * particles))
     scale = job.progress.iterations / some
     space, preference = job.spec.design_space(), PREFERENCES["B"]
+    by_other = job.spec.model_copy(update={"preference": preference})
+    limits = [{"quantity": "*", "relative_to": "published:A", "max": 1.5}, "speed>=0.01"]
+    constrained = JobService(store).under(
+        job.spec, TypeAdapter(Constraints).validate_python(limits)
+    )
     return {
         "read row by row": (lambda: store.evaluations_between(job.id, 0, some), scale),
         "read as columns": (lambda: HistoryCache(store).columns(job), 1.0),
         "read again": (lambda: cache.columns(job), 1.0),
         "judge one by one": (lambda: judge(part.objectives, part.failed, preference), scale),
-        "rank all at once": (lambda: rank(columns, job.spec, RankingRequest(preference="B")), 1.0),
+        "rank all at once": (lambda: rank(columns, by_other, top=20), 1.0),
+        "rank under constraints": (lambda: rank(columns, constrained, top=20), 1.0),
         "distribution": (lambda: distribution(columns, space), 1.0),
         "list 200 jobs": (lambda: store.jobs(limit=200), 1.0),
         "list by name, search": (

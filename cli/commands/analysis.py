@@ -13,7 +13,13 @@ import typer
 
 from gaitswarm.cli.commands.designs import Radius, Samples, Seed, shown_progress
 from gaitswarm.cli.files import replacing
-from gaitswarm.cli.options import JobId, Precision
+from gaitswarm.cli.options import (
+    ConstraintOption,
+    JobId,
+    NoConstraints,
+    NoWorseThan,
+    Precision,
+)
 from gaitswarm.cli.output import Parts, Printed, note
 from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -42,21 +48,29 @@ if TYPE_CHECKING:
 def rank(
     job_id: JobId,
     preference: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAME|JSON",
             help='A, B, C, chapter-3, or JSON: {"bias": [five or six numbers], "exponent": [as'
-            " many]}.",
+            " many]} [default: the job's].",
         ),
-    ],
+    ] = None,
+    constraint: ConstraintOption = None,
+    no_worse_than: NoWorseThan = None,
+    no_constraints: NoConstraints = False,
     top: Annotated[int, typer.Option(help="Number of designs to show.")] = 20,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """Rank a job's stored designs by another preference, without simulation."""
-    from gaitswarm.cli.inputs import preference_choice
+    """Rank a job's stored designs by another preference or other constraints."""
+    from gaitswarm.cli.inputs import constraint_choice, preference_choice
 
-    ranking = jobs.ranking(job_id, preference_choice(preference), top=top)
+    ranking = jobs.ranking(
+        job_id,
+        None if preference is None else preference_choice(preference),
+        constraints=constraint_choice(constraint, no_worse_than, none=no_constraints),
+        top=top,
+    )
     return ranking, _ranking(ranking)
 
 
@@ -75,7 +89,8 @@ def _ranking(ranking: RankingView) -> Parts:
     yield table(columns + (["F (eq. 3.1)"] if maximized else []), rows)
     agreement = MISSING if ranking.correlation is None else f"{ranking.correlation:.3f}"
     yield (
-        f"{ranking.evaluations} designs; fitness of the job's best:"
+        f"{ranking.evaluations} designs, {ranking.infeasible} of them infeasible; fitness of the"
+        " job's best:"
         f" {number(ranking.fitness_of_present_best)}; rank correlation: {agreement}"
     )
 
@@ -89,6 +104,9 @@ def front(
     most: Annotated[
         int, typer.Option(help="Maximum number of designs with --json and --output.")
     ] = 1000,
+    constraint: ConstraintOption = None,
+    no_worse_than: NoWorseThan = None,
+    no_constraints: NoConstraints = False,
     *,
     jobs: Jobs,
 ) -> Printed:
@@ -97,9 +115,12 @@ def front(
     Lists knees, the best design in each objective, under A, B and C, and under the job's
     preference, and the hypervolume.
     """
+    from gaitswarm.cli.inputs import constraint_choice
+
     if output is not None and output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
-    view = jobs.front(job_id, most=most)
+    constraints = constraint_choice(constraint, no_worse_than, none=no_constraints)
+    view = jobs.front(job_id, constraints=constraints, most=most)
     if output is not None:
         with replacing(output, "output") as file:
             file.write(_front_csv(view))

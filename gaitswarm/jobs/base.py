@@ -6,6 +6,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial, wraps
 from itertools import islice
 from types import TracebackType
@@ -55,7 +56,7 @@ from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, ev
 from gaitswarm.services.optimizer.analysis.failures import FailuresView, failures
 from gaitswarm.services.optimizer.analysis.front import (
     FRONT_DESIGNS,
-    MOST_FRONT_DESIGNS,
+    FrontRequest,
     FrontView,
     pareto_front,
 )
@@ -77,12 +78,15 @@ from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, Rankin
 from gaitswarm.services.optimizer.analysis.reference import with_reference
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.analysis.utilities import (
+    fitness_by,
+    infeasible_rows,
     objective_vectors,
     require_success,
     tuning_spec,
 )
 from gaitswarm.services.optimizer.analysis.verdict import VerdictView, verdict
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
@@ -106,6 +110,7 @@ from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.simulation import sampled_indices
 from gaitswarm.specs import (
+    ConstraintInput,
     ForkOptions,
     PreferenceInput,
     SpecInput,
@@ -677,15 +682,26 @@ class Jobs(ABC):
     @analysis(
         "POST /jobs/{job_id}/ranking",
         "rank_designs",
-        "Rank designs under another preference",
+        "Rank designs under another preference or other constraints",
         body=RankingRequest,
     )
-    def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
-        """Rank all designs of a job under another preference; nothing is simulated.
+    def ranking(
+        self,
+        job_id: str,
+        preference: PreferenceInput | None = None,
+        *,
+        constraints: Sequence[ConstraintInput] | None = None,
+        top: int = 20,
+    ) -> RankingView:
+        """Rank all designs of a job under another preference or other constraints.
+
+        Stored results are judged; at most references of constraints are simulated.
 
         Args:
             preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-                `Preference`.
+                `Preference`; None: as by the job.
+            constraints: Limits that a design must keep, such as "speed>=0.05"; None: those of the
+                job, an empty list: none.
             top: How many of the best designs to list, 1 to 1000.
         """
         job = self._service.job(job_id)
@@ -695,12 +711,21 @@ class Jobs(ABC):
                 " preference",
                 field="preference",
             )
-        request = RankingRequest(preference=preference, top=top)
-        return rank(self._service.columns(job), job.spec, request)
+        spec = self._service.under(job.spec, cast("Sequence[Constraint] | None", constraints))
+        if preference is not None:
+            spec = spec.model_copy(update={"preference": preference})
+        return rank(self._service.columns(job), spec, top=top)
 
     def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
         job = self._service.job(job_id)
         return tuning_spec(job_id, job.spec, has), self._service.columns(job)
+
+    def _feasible(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
+        """Return only the designs that keep the job's constraints."""
+        spec, columns = self._tuning(job_id, has)
+        if spec.constraints:
+            columns = columns.rows(np.flatnonzero(~infeasible_rows(columns, spec)))
+        return spec, columns
 
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> FailuresView:
@@ -792,20 +817,22 @@ class Jobs(ABC):
         )
         limits, job = self._context.limits, self._service.job(job_id)
         limits.check_ranked(drawn, job)
-        tuning_spec(job_id, job.spec, "a preference")
+        spec, columns = self._feasible(job_id, "a preference")
         index = partial(sampled_indices, check=limits.check_sampled)
-        return robust_preferences(job_id, job.spec, self._service.columns(job), request, index)
+        return robust_preferences(job_id, spec, columns, request, index)
 
-    @analysis("GET /jobs/{job_id}/front", "get_front", "Get the Pareto front")
+    @analysis("POST /jobs/{job_id}/front", "find_front", "Find the Pareto front", body=FrontRequest)
     def front(
         self,
         job_id: str,
         *,
-        most: Annotated[int, Field(ge=1, le=MOST_FRONT_DESIGNS)] = FRONT_DESIGNS,
+        constraints: Sequence[ConstraintInput] | None = None,
+        most: int = FRONT_DESIGNS,
     ) -> FrontView:
         """Find the Pareto front of a job over f1 to f5, from stored objectives.
 
         Args:
+            constraints: As for `ranking`.
             most: Maximum number of designs to list, 1 to 10 000; of more, marked designs and others
                 that cover the front evenly.
 
@@ -814,8 +841,16 @@ class Jobs(ABC):
         """
         spec, columns = self._tuning(job_id, "objectives to trade")
         vectors = objective_vectors(columns, aggregation=spec.aggregation)
+        if constraints is not None:
+            spec = self._service.under(spec, cast("Sequence[Constraint]", constraints))
+            preference = spec.resolved_preference()
+            own = fitness_by(columns, preference, aggregation=spec.aggregation)
+            columns = replace(columns, fitness=own)
+        infeasible = infeasible_rows(columns, spec) & np.isfinite(vectors[:, 0])
+        vectors[infeasible] = np.inf
         require_success(job_id, vectors)
-        return pareto_front(columns, vectors, spec, most=most)
+        count = int(np.count_nonzero(infeasible))
+        return pareto_front(columns, vectors, spec, most=most, infeasible=count)
 
     @analysis(
         "GET /jobs/{job_id}/preference-for", "get_preference_for", "Find a preference for a design"
@@ -829,12 +864,19 @@ class Jobs(ABC):
 
         Raises:
             NotFound: The job has no such design.
-            Conflict: The design fails in a scenario.
+            Conflict: The design fails in a scenario, or violates a constraint.
         """
-        spec, columns = self._tuning(job_id, "objectives to trade")
+        _, columns = self._tuning(job_id, "objectives to trade")
+        place = (columns.iteration == iteration) & (columns.particle == particle)
+        if not place.any():
+            raise NotFound(f"job {job_id} has no design {iteration}.{particle}")
+        spec, columns = self._feasible(job_id, "objectives to trade")
         rows = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
         if not len(rows):
-            raise NotFound(f"job {job_id} has no design {iteration}.{particle}")
+            raise Conflict(
+                f"design {iteration}.{particle} violates the job's constraints, so it wins under no"
+                " preference"
+            )
         if not np.isfinite(
             objective_vectors(columns.rows(rows), aggregation=spec.aggregation)
         ).all():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -19,7 +19,8 @@ from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.analysis.reference import with_references
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
-from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
+from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
     MeasuredRates,
@@ -37,6 +38,7 @@ from gaitswarm.services.optimizer.jobs.job import (
     check_priority,
     refusal,
 )
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
@@ -160,6 +162,14 @@ class JobService:
 
     def job(self, job_id: str) -> Job:
         return self.store.job(job_id)
+
+    def under(self, spec: JobSpec, constraints: Sequence[Constraint] | None) -> JobSpec:
+        """Return a job's spec under other constraints; None for its own."""
+        if constraints is None:
+            return spec
+        changed = checked_spec(spec, {"constraints": [c.model_dump() for c in constraints]})
+        assert isinstance(changed, JobSpec), "the kind does not change"  # noqa: S101
+        return with_references(changed, self.job, self.store.best, starts=False)
 
     def closest(self, job: Job) -> ClosestView | None:
         """Return the design of least violation; None without constraints or with a best design."""

@@ -59,7 +59,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"post {job}/preferences",
         f"get {job}/firmware",
         f"get {job}/firmware/summary",
-        f"get {job}/front",
+        f"post {job}/front",
         f"get {job}/preference-for",
         f"get {job}/parameters",
         f"get {job}/targets",

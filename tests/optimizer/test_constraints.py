@@ -394,3 +394,49 @@ def test_statuses_count_as_failures_alone(store: Store) -> None:
     assert only.failed == int((columns.statuses != Status.OK).any(axis=1).sum())
     assert only.infeasible == len(columns) - only.failed
     assert only.best is None
+
+
+def test_a_history_is_ranked_under_other_constraints_without_simulation(store: Store) -> None:
+    job = run(store, spec(FAST))
+    jobs = DatabaseJobs(JobService(store), "")
+    columns = store.evaluation_columns(job.id, 0, 100)
+    assert columns is not None
+    assert isinstance(job.spec, JobSpec)
+    for constraints in (None, [], ["slope-fast:reciprocal_speed<=0.98", "torque<=4"]):
+        measure = spec(*(job.spec.constraints if constraints is None else constraints))
+        expected = measure.judge(columns.objectives, columns.failed).fitness
+        ranking = jobs.ranking(job.id, constraints=constraints, top=1000)
+        assert [design.fitness for design in ranking.top] == pytest.approx(
+            sorted(expected[np.isfinite(expected)].tolist())
+        )
+        assert ranking.infeasible == len(columns) - len(ranking.top) - int(
+            columns.failed.any(axis=1).sum()
+        )
+        by_b = jobs.ranking(job.id, "B", constraints=constraints, top=1000)
+        places = {(design.iteration, design.particle) for design in ranking.top}
+        assert {(design.iteration, design.particle) for design in by_b.top} == places
+
+        front = jobs.front(job.id, constraints=constraints)
+        assert {(design.iteration, design.particle) for design in front.designs} <= places
+        assert (front.designs_judged, front.infeasible) == (len(ranking.top), ranking.infeasible)
+        winner = next(winner for winner in front.winners if winner.preference == "job")
+        assert winner.fitness == pytest.approx(float(expected.min()))
+
+
+def test_analyses_of_preferences_know_feasible_designs_alone(store: Store) -> None:
+    job = run(store, spec(FAST))
+    jobs = DatabaseJobs(JobService(store), "")
+    columns = store.evaluation_columns(job.id, 0, 100)
+    assert columns is not None
+    slow = (columns.objectives[:, :, 4] > 1.0).any(axis=1) & ~columns.failed.any(axis=1)
+    infeasible = set(
+        zip(columns.iteration[slow].tolist(), columns.particle[slow].tolist(), strict=True)
+    )
+    winners = jobs.preferences(job.id, drawn=20, candidates=20).candidates
+    assert not infeasible.intersection((w.iteration, w.particle) for w in winners)
+    iteration, particle = min(infeasible)
+    with pytest.raises(gaitswarm.Conflict, match="violates the job's constraints"):
+        jobs.preference_for(job.id, iteration, particle)
+    best = job.progress
+    assert best.best_iteration is not None and best.best_particle is not None
+    assert jobs.preference_for(job.id, best.best_iteration, best.best_particle).wins

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
+from gaitswarm.services.optimizer.analysis.ranking import RankingView, rank
 from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -76,10 +76,9 @@ def two_objectives(*pairs: tuple[float, float]) -> np.ndarray:
 
 def ranked(columns: EvaluationColumns, preference: Preference, top: int) -> RankingView:
     """Iterations of its designs are their rows, where each has one particle."""
-    spec = JobSpec(scenarios=("1",))
+    spec = JobSpec(scenarios=("1",), preference=preference)
     designs = np.zeros((len(columns), len(spec.design_space().names)))
-    request = RankingRequest(preference=preference, top=top)
-    return rank(replace(columns, designs=designs), spec, request)
+    return rank(replace(columns, designs=designs), spec, top=top)
 
 
 TORQUE = Preference(bias=(0.0,) * 5, exponent=(1.0, 0.0, 0.0, 0.0, 0.0))

@@ -22,7 +22,7 @@ SCATTER = re.compile("designs of the front by")
 
 
 def front_of(server: ServerProcess, job_id: str) -> Any:
-    return server.client.get(f"/v1/jobs/{job_id}/front").json()
+    return server.client.post(f"/v1/jobs/{job_id}/front", json={}).json()
 
 
 def place(design: dict[str, Any]) -> str:

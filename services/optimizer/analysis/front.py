@@ -18,10 +18,18 @@ from gaitswarm.services.optimizer.analysis.utilities import (
     PreferenceOwner,
     fitness_by,
 )
+from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View
+from gaitswarm.services.optimizer.views import (
+    DesignValues,
+    Finite,
+    IterationIndex,
+    Particle,
+    Request,
+    View,
+)
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -198,12 +206,32 @@ class FrontIterationView(View):
     hypervolume: float = Field(description="Of the front up to this iteration [1].")
 
 
+class FrontRequest(Request):
+    """Constraints of the designs on a front, and how many to list."""
+
+    most: int = Field(
+        default=FRONT_DESIGNS,
+        ge=1,
+        le=MOST_FRONT_DESIGNS,
+        description="Maximum number of designs to list.",
+    )
+    constraints: Constraints | None = Field(
+        default=None,
+        description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
+        " list: none.",
+        examples=[["speed>=0.05"]],
+    )
+
+
 class FrontView(View):
     """The Pareto front of a job, without simulation."""
 
     objectives: list[ObjectiveView] = Field(description="f1 to f5 of table 4.1, in order.")
-    designs_judged: int = Field(description="Designs of the job that succeed in all scenarios.")
-    failed: int = Field(description="Designs that do not.")
+    designs_judged: int = Field(
+        description="Designs of the job that succeed in all scenarios and keep the constraints."
+    )
+    failed: int = Field(description="Designs that fail in a scenario.")
+    infeasible: int = Field(description="Others, which violate a constraint.")
     size: int = Field(description="Nondominated designs; of equal ones the earliest.")
     ideal: dict[str, float] = Field(description="Least of the front in each objective.")
     nadir: dict[str, float] = Field(description="Greatest of the front in each objective.")
@@ -237,9 +265,11 @@ class FrontView(View):
 
 
 def pareto_front(
-    columns: EvaluationColumns, vectors: Floats, spec: JobSpec, *, most: int
+    columns: EvaluationColumns, vectors: Floats, spec: JobSpec, *, most: int, infeasible: int = 0
 ) -> FrontView:
     """Find the front of (r, M) objective vectors, at least one row finite.
+
+    infeasible: number of designs that violate a constraint; their vectors are +inf, as of failures.
 
     Normalised objectives are logarithms, 0 at the ideal and 1 at the nadir.
     """
@@ -257,10 +287,20 @@ def pareto_front(
     sums = normalised[rows].sum(axis=1)
     extremes = rows[[np.lexsort((sums, values))[0] for values in vectors[rows].T]]
     knees = front_knees(normalised, rows, extremes)
+    candidates = (
+        np.flatnonzero(np.isfinite(vectors[:, 0])) if infeasible else np.arange(len(vectors))
+    )
+    among = columns.rows(candidates)
     winners = {
-        name: int(fitness_by(columns, preference, aggregation=spec.aggregation).argmin())
-        for name, preference in NAMED.items()
-    } | {"job": int(columns.fitness.argmin())}
+        name: int(candidates[fitness.argmin()])
+        for name, fitness in [
+            *(
+                (name, fitness_by(among, preference, aggregation=spec.aggregation))
+                for name, preference in NAMED.items()
+            ),
+            ("job", among.fitness),
+        ]
+    }
 
     marks: dict[int, list[str]] = {}
     for number, (row, _) in enumerate(knees, start=1):
@@ -281,7 +321,8 @@ def pareto_front(
     return FrontView(
         objectives=[ObjectiveView.model_validate(f) for f in NORMALISED_OBJECTIVES],
         designs_judged=judged,
-        failed=len(columns) - judged,
+        failed=len(columns) - judged - infeasible,
+        infeasible=infeasible,
         size=len(rows),
         ideal=by_objective(vectors[rows].min(axis=0)),
         nadir=by_objective(vectors[rows].max(axis=0)),

@@ -78,8 +78,8 @@ class VariableImportanceView(View):
         " there are too few, or all are equal."
     )
     failing: IndexIntervalView | None = Field(
-        description="Index for failure, among all designs; null if none fails, all do, or there"
-        " are too few."
+        description="Index for failure or infeasibility, among all designs; null if none fails, all"
+        " do, or there are too few."
     )
     objectives: dict[str, IndexIntervalView | None] = Field(
         description="Index for each objective over all scenarios, among designs that succeed in"

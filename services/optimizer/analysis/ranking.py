@@ -11,28 +11,32 @@ from pydantic import Field
 from gaitswarm.services.optimizer.analysis.distribution import iteration_starts
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
 from gaitswarm.services.optimizer.analysis.statistics import spearman
-from gaitswarm.services.optimizer.analysis.utilities import fitness_by
+from gaitswarm.services.optimizer.analysis.utilities import fitness_by, infeasible_rows
+from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, evaluations_of
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View
 
 Floats = NDArray[np.float64]
 
 
 class RankingRequest(Request):
-    """Preference by which to rank the designs of a job."""
+    """Preference and constraints by which to rank the designs of a job."""
 
-    preference: PreferenceChoice = Field(
+    preference: PreferenceChoice | None = Field(
+        default=None,
         description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
-        " your own.",
+        " your own; null: as by the job.",
         examples=["B"],
     )
+    constraints: Constraints | None = Field(
+        default=None,
+        description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
+        " list: none.",
+        examples=[["speed>=0.05"]],
+    )
     top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
-
-    def resolved_preference(self) -> Preference:
-        """The preference in full."""
-        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
 
 class RankedDesignView(EvaluationView):
@@ -58,6 +62,9 @@ class RankingView(View):
 
     preference: PreferenceChoice = Field(description="The requested preference.")
     evaluations: int = Field(description="Designs that were ranked.")
+    infeasible: int = Field(
+        description="Designs that did not fail and violate the requested constraints."
+    )
     fitness_of_present_best: Finite = Field(
         description="By the requested preference, of the job's own best design [1].",
         examples=[23.1],
@@ -71,23 +78,28 @@ class RankingView(View):
     best_so_far: list[BestSoFarView] = Field(description="One entry an iteration, in order.")
 
 
-def rank(columns: EvaluationColumns, spec: JobSpec, request: RankingRequest) -> RankingView:
-    """Rank all designs by their stored objectives."""
-    preference = request.resolved_preference()
-    fitness, before = fitness_by(columns, preference, aggregation=spec.aggregation), columns.fitness
+def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
+    """Rank all designs by their stored results.
+
+    spec: the job's, with the requested preference and constraints.
+    """
+    preference, before = spec.resolved_preference(), columns.fitness
+    fitness = fitness_by(columns, preference, aggregation=spec.aggregation)
+    walked = np.isfinite(fitness)
+    fitness[infeasible_rows(columns, spec)] = np.inf
     present = _best_first(before)
     ranks = {row: rank for rank, row in enumerate(present.tolist(), start=1)}
-    rows = _best_first(fitness)[: request.top]
-    top = evaluations_of(replace(columns, fitness=fitness).rows(rows))
-    views = evaluation_views(top, spec.model_copy(update={"preference": preference}))
+    rows = _best_first(fitness)[:top]
+    views = evaluation_views(evaluations_of(replace(columns, fitness=fitness).rows(rows)), spec)
     starts = iteration_starts(columns)
     least = np.minimum.reduceat(fitness, starts) if len(starts) else fitness
     best_so_far = np.minimum.accumulate(least).tolist()
     both = np.isfinite(fitness) & np.isfinite(before)
     correlation = spearman(fitness[both], before[both]) if both.any() else None
     return RankingView(
-        preference=request.preference,
+        preference=spec.preference,
         evaluations=len(columns),
+        infeasible=int(np.count_nonzero(walked & np.isinf(fitness))),
         fitness_of_present_best=float(fitness[present[0]]) if len(present) else None,
         correlation=correlation,
         top=[

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.constraints import violations
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -54,7 +55,15 @@ def tuning_spec(job_id: str, spec: AnySpec, has: str) -> JobSpec:
 def require_success(job_id: str, values: Floats) -> None:
     """Check that any of a job's designs has finite values (r, n)."""
     if not np.isfinite(values).all(axis=1).any():
-        raise Conflict(f"job {job_id} has no design yet that succeeds in all scenarios")
+        raise Conflict(
+            f"job {job_id} has no design yet that succeeds in all scenarios and keeps the"
+            " constraints, if any"
+        )
+
+
+def infeasible_rows(columns: EvaluationColumns, spec: JobSpec) -> NDArray[np.bool_]:
+    """Return which designs (r,) violate the constraints of a spec; failed ones do, too."""
+    return violations(spec.limits(), columns.objectives) > 0.0
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:

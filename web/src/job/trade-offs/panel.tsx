@@ -1,6 +1,6 @@
 /** Pareto front of a job, and the preferences that select its designs. */
 
-import { get, getBytes } from '../../api/client'
+import { get, getBytes, post } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
 import type { Front, FrontWinner, Job, PreferenceFit, PreferenceFor } from '../../api/types'
 import { Card, EmptyCard, Loaded } from '../../components/card'
@@ -28,7 +28,7 @@ export default function TradeOffsPanel({ job }: { job: Job }) {
   const path = { job_id: job.id }
   const front = useResource(
     exists ? `${job.id} ${iterations}` : null,
-    (signal) => get('/v1/jobs/{job_id}/front', { path, signal }),
+    (signal) => post('/v1/jobs/{job_id}/front', { path, body: {}, signal }),
     { keep: true },
   )
   const all = useResource(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -234,6 +235,9 @@ def test_the_best_design_is_the_best_feasible_one(store: Store) -> None:
     assert sum(i.failed for i in iterations) == int(failed.sum())
     assert sum(i.infeasible for i in iterations) == job.progress.infeasible
     assert not check_history(store, job).problem
+    for forged in ({"infeasible": 0}, {"least_violation": 0.5}):
+        edited = replace(job, progress=replace(job.progress, **forged))
+        assert "infeasible designs are not those" in check_history(store, edited).problem
 
 
 @pytest.mark.parametrize("method", ["pso", "cma-es"])

@@ -198,7 +198,8 @@ class _Summary:
         self._readable = job.readable
         self._best: float | None = None
         self._place: tuple[int, int] | None = None
-        self._evaluations = 0
+        self._evaluations = self._infeasible = 0
+        self._least_violation: float | None = None
 
     def extend(
         self, link: Link, columns: EvaluationColumns, reevaluation: Reevaluation | None
@@ -226,6 +227,9 @@ class _Summary:
         if best is not None and particle is not None and (self._best is None or best < self._best):
             self._place = (index, particle)
         self._best = expected["best_so_far"]
+        self._infeasible += expected["infeasible"]
+        known = [v for v in (self._least_violation, expected["least_violation"]) if v is not None]
+        self._least_violation = min(known, default=None)
 
     def problem(self) -> str:
         """Describe a summary value that does not follow from the iterations; empty if all do."""
@@ -237,6 +241,11 @@ class _Summary:
             place = (progress.best_iteration, progress.best_particle)
         if self._readable and (progress.best_fitness, place) != (self._best, self._place):
             return "its recorded best design is not the best of its iterations"
+        if self._readable and (
+            progress.infeasible != self._infeasible
+            or not _same(self._least_violation, progress.least_violation)
+        ):
+            return "its recorded infeasible designs are not those of its iterations"
         return ""
 
 

@@ -20,6 +20,7 @@ import { fitColumn, ScatterCard } from './scatter-card'
 
 const RENEW_MS = 8000
 const MOST_DRAWN = 5000
+const MOST_LISTED = 1000
 
 export default function TradeOffsPanel({ job }: { job: Job }) {
   const selected = placeOf(usePlace().query.get('design'))
@@ -28,7 +29,7 @@ export default function TradeOffsPanel({ job }: { job: Job }) {
   const path = { job_id: job.id }
   const front = useResource(
     exists ? `${job.id} ${iterations}` : null,
-    (signal) => post('/v1/jobs/{job_id}/front', { path, body: {}, signal }),
+    (signal) => post('/v1/jobs/{job_id}/front', { path, body: { most: MOST_LISTED }, signal }),
     { keep: true },
   )
   const all = useResource(

@@ -622,14 +622,15 @@ class Jobs(ABC):
     @analysis("GET /jobs/{job_id}/verdict", "get_verdict", "Judge the best design in words")
     def verdict(self, job_id: str) -> VerdictView:
         """Compare the best design of a tuning job so far with its reference in each scenario, and
-        name variables at a bound.
+        name variables at a bound and constraints at a limit.
 
         The reference is the published design of the job's controller and preference, or without one
         the middle of the bounds. It is simulated once and stored with the job; job lists include it
         from then on.
         """
         job, reason = with_reference(self._service.store, self._service.job(job_id))
-        return verdict(job, self._service.store.best(job_id), reason)
+        closest = self._service.closest(job) if job.readable else None
+        return verdict(job, self._service.store.best(job_id), reason, closest)
 
     @items
     @core("GET /jobs/{job_id}/iterations", "list_iterations", "List committed iterations")

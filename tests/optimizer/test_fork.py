@@ -285,6 +285,12 @@ def test_a_fork_within_other_bounds_searches_there_from_the_best_designs(store: 
     shown = job.spec.design_space().shown(columns.designs[judged.argmin()].tolist())
     assert forked.spec.start[0] == shown  # type: ignore[index]
 
+    # Within narrower bounds, only designs inside are a start.
+    low = float(np.median(columns.designs[: 3 * PARTICLES, 0]))
+    narrow = fork(store, job, 3, bounds={"P": [low, 3.0]})
+    starts = [float(design["P"]) for design in narrow.spec.start]  # type: ignore[call-overload]
+    assert min(starts) >= low
+
 
 @pytest.mark.variants("given0-*", "given4-*")
 @pytest.mark.parametrize(

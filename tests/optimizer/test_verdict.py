@@ -16,6 +16,8 @@ from gaitswarm.services.optimizer.analysis.verdict import (
     bounds_reached,
     compared,
     comparison_in_words,
+    limits_in_words,
+    limits_reached,
     percentage,
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -150,6 +152,28 @@ def test_over_worlds_a_figure_is_the_geometric_mean_of_worlds_in_which_both_walk
     (energy,) = (view for view in views(ratios, spec) if view.name == "energy")
     assert energy.scenarios["normal-fast"].value == pytest.approx(35.0)
     assert energy.scenarios["normal-fast"].reference == pytest.approx(70.0)
+
+
+def test_constraints_at_their_limit_are_named_with_their_closest_place() -> None:
+    spec = tuning(constraints=["torque<=9.05", "slope-fast:speed>=0.0499", "energy<=80"])
+    results = np.ones((3, len(RESULTS)))
+    results[:, : PUBLISHED.shape[1]] = PUBLISHED
+    results[:, _COLUMNS.index("speed")] = 0.05
+    results[0, 0] = 8.99
+    limits = limits_reached(spec, results)
+    assert [(limit.quantity, limit.case) for limit in limits] == [
+        ("speed", "slope-fast"),
+        ("torque", "slope-fast"),
+        ("torque", "loaded-slow"),
+        ("torque", "normal-fast"),
+    ]
+    (sentence,) = limits_in_words(limits)
+    assert sentence == (
+        "At the limit of a constraint: slope-fast:speed>=0.0499 (speed in slope-fast: 0.05 m/s)"
+        " and torque<=9.05 (torque in slope-fast: 9 N m, and 2 more)."
+    )
+    assert limits_reached(tuning(), results) == []
+    assert list(limits_in_words([])) == []
 
 
 def test_bounds_of_a_design_are_named_and_those_that_can_be_widened_all_at_once() -> None:

@@ -347,15 +347,19 @@ def _from_best_designs(
             f"{reason}, and a job of kind {spec.kind} samples its designs, so it cannot start from"
             " the best of another job; submit a new job instead"
         )
-    searched = tuple(variable.name for variable in spec.design_space().variables)
+    variables = spec.design_space().variables
+    searched = tuple(variable.name for variable in variables)
     count = min(request.start_count, spec.budget)
     space, columns = parent.job.spec.design_space(), parent.columns
     order = _ordered(judge, columns, fitness)
+    for variable in variables if request.bounds else ():
+        values = columns.designs[:, space.names.index(variable.name)]
+        order = np.where((values < variable.low) | (values > variable.high), np.inf, order)
     designs = tuple(best_designs(space, columns.designs, order, searched, count))
     if not designs:
         raise Conflict(
-            f"every design of job {parent.job.id} in these iterations has failed;"
-            " there is none to start from"
+            f"every design of job {parent.job.id} in these iterations has failed or is outside"
+            " the bounds; there is none to start from"
         )
     try:
         return checked_spec(spec, {"start": designs})

@@ -252,7 +252,7 @@ def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
         if not job.readable or not isinstance(job.spec, JobSpec):
             return job, "the job is not a tuning job"
         if job.progress.best_fitness is None:
-            return job, "no design has succeeded in every scenario yet"
+            return job, "no design is feasible yet"
         try:
             if changes_since(job.provenance, job_provenance(job.spec)):
                 return job, "the job was computed by other code or libraries"
@@ -271,7 +271,7 @@ def _why_none(job: Job) -> str:
     if reference.fitness is None:
         description = START if reference.kind == "start" else f"published design {reference.name}"
         return f"the {description} fails in one of the scenarios"
-    return "no design has succeeded in every scenario yet"
+    return "no design is feasible yet"
 
 
 def note_reference(store: Store, job: Job) -> Job:

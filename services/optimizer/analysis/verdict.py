@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.bounds import End, bound_at, with_wider_bounds
+from gaitswarm.services.optimizer.analysis.bounds import NEAR, End, bound_at, with_wider_bounds
+from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, LimitView, limit_views
 from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
@@ -121,6 +122,9 @@ class VerdictView(View):
         examples=[{"better": 22, "same": 1, "worse": 7}],
     )
     bounds: list[BoundView] = Field(description="Variables at a bound of the search.")
+    limits: list[LimitView] = Field(
+        description="Limits of constraints that the best design reaches, to within a hundredth."
+    )
     widen: str | None = Field(
         description="Command that starts another search from the best designs within wider bounds;"
         " null if no wider bounds can be simulated.",
@@ -128,23 +132,30 @@ class VerdictView(View):
     )
 
 
-def verdict(job: Job, best: Evaluation | None, reason: str | None) -> VerdictView:
+def verdict(
+    job: Job, best: Evaluation | None, reason: str | None, closest: ClosestView | None
+) -> VerdictView:
     """Judge the best design of a job.
 
     Args:
         job: With its reference, if that is known.
         best: Its best design, if there is one.
         reason: Why there is no gain, if there is none.
+        closest: Design of least violation, if none is feasible.
     """
     reference, spec = job.reference, job.stored_spec
     quantities: list[QuantityView] = []
-    sentences: list[str] = []
+    sentences = [] if closest is None else [f"{closest.explanation}."]
+    limits: list[LimitView] = []
     bounds: list[BoundView] = []
     widen = None
     if best is not None and isinstance(spec, JobSpec):
+        results = (best.reevaluation or best).objectives
         if reference is not None:
-            quantities = compared(spec, (best.reevaluation or best).objectives, reference)
+            quantities = compared(spec, results, reference)
             sentences += comparison_in_words(quantities, reference, job.gain)
+        limits = limits_reached(spec, results)
+        sentences += limits_in_words(limits)
         bounds, widened = bounds_reached(spec, best.design)
         sentences += bounds_in_words(bounds, len(spec.design_space().variables))
         if widened:
@@ -161,6 +172,7 @@ def verdict(job: Job, best: Evaluation | None, reason: str | None) -> VerdictVie
         sentences=sentences,
         quantities=quantities,
         figures={judgement: counts[judgement] for judgement in ("better", "same", "worse")},
+        limits=limits,
         bounds=bounds,
         widen=widen,
     )
@@ -288,6 +300,31 @@ def _counts_in_words(counts: Mapping[Judgement, int], total: int) -> str:
     texts: dict[Judgement, str] = {"better": "better", "same": "the same", "worse": "worse"}
     parts = [f"{text} in {counts[name]}" for name, text in texts.items() if counts.get(name)]
     return f"{listed(parts).capitalize()} of {total} figures."
+
+
+def limits_reached(spec: JobSpec, results: Floats) -> list[LimitView]:
+    """Return the limits of constraints that results (K, m) reach, the closest first."""
+    limits = sorted(limit_views(spec, results), key=_distance)
+    return [limit for limit in limits if _distance(limit) <= NEAR]
+
+
+def _distance(limit: LimitView) -> float:
+    return abs(limit.value - limit.limit) / (abs(limit.limit) or 1.0)
+
+
+def limits_in_words(limits: Sequence[LimitView]) -> Iterator[str]:
+    """Yield a sentence on the constraints that are reached, each with its closest limit."""
+    if not limits:
+        return
+    by_constraint: dict[str, list[LimitView]] = {}
+    for limit in limits:
+        by_constraint.setdefault(limit.constraint, []).append(limit)
+    texts = []
+    for constraint, (first, *others) in by_constraint.items():
+        more = f", and {len(others)} more" if others else ""
+        place = f"{first.quantity.replace('_', ' ')} in {first.case}: {first.value:.3g}"
+        texts.append(f"{constraint} ({place} {first.unit}{more})")
+    yield f"At the limit of a constraint: {listed(texts)}."
 
 
 def bounds_reached(spec: JobSpec, design: Floats) -> tuple[list[BoundView], dict[str, str]]:

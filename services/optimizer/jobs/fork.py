@@ -27,8 +27,8 @@ _SPEC_FIELDS: Final = (
 )
 """Fields of a request that are also fields of a spec."""
 
-_FREE: Final = frozenset({"name", "iterations"})
-"""Fields of a spec that may differ without changing the search."""
+_FREE: Final = frozenset({"name", "iterations", "start"})
+"""Fields of a spec that no lineage lists as changed."""
 
 
 class ForkRequest(BaseModel):
@@ -167,7 +167,8 @@ def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
     changes = {name: getattr(request, name) for name in _SPEC_FIELDS}
     changes = {name: value for name, value in changes.items() if value is not None}
     if request.bounds:
-        changes["variables"] = _within(parent, request.bounds)
+        # Start designs may lie outside; the best designs replace them.
+        changes |= {"variables": _within(parent, request.bounds), "start": ()}
     if request.particles is not None:
         settings = changes.get("optimizer", parent.optimizer)
         changes["optimizer"] = settings.model_dump() | {"particles": request.particles}
@@ -194,6 +195,6 @@ def _within(
 
 
 def changed_fields(parent: AnySpec, fork: AnySpec) -> tuple[str, ...]:
-    """Return the fields that differ, except name and budget."""
+    """Return the fields that differ, except name, budget and start."""
     names = (name for name in type(parent).model_fields if name not in _FREE)
     return tuple(name for name in names if getattr(parent, name) != getattr(fork, name))

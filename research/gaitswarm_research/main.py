@@ -13,6 +13,7 @@ from gaitswarm_research.compare.bbob import bbob
 from gaitswarm_research.compare.command import compare
 from gaitswarm_research.reconstruction.command import reconstruction
 from gaitswarm_research.studies.accuracy import noise, steps, tables
+from gaitswarm_research.studies.constraints import constraints
 from gaitswarm_research.studies.controllers import controllers
 from gaitswarm_research.studies.drives import drives
 from gaitswarm_research.studies.precision import precision
@@ -37,10 +38,20 @@ app.command()(bbob)
 app.command()(reconstruction)
 study = typer.Typer(
     no_args_is_help=True,
-    help="Measure effects of tables, time steps, noise, precision, controllers, worlds, drives and"
-    " preferences.",
+    help="Measure effects of tables, time steps, noise, precision, controllers, worlds, drives,"
+    " preferences and constraints.",
 )
-for command in (tables, steps, noise, precision, controllers, worlds, drives, preferences):
+for command in (
+    tables,
+    steps,
+    noise,
+    precision,
+    controllers,
+    worlds,
+    drives,
+    preferences,
+    constraints,
+):
     study.command()(command)
 app.add_typer(study, name="study")
 

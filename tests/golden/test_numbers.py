@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from gaitswarm import simulate
 from gaitswarm.sim.assembly import Backend
 from gaitswarm.sim.compiler.compilation import Target, target
 from gaitswarm.sim.errors import SimulationInputError
@@ -24,6 +25,7 @@ from tests.golden.numbers import (
     objectives_with_torque,
     read,
     run_demo,
+    run_gait_demo,
 )
 
 GOLDEN = read()
@@ -83,6 +85,21 @@ def test_torque_controlled_actuators_give_what_they_did(backend: Backend) -> Non
 def test_the_demos_best_design_is_worth_what_it_was(backend: Backend) -> None:
     assert fitness_of(GOLDEN.best.design) == as_kept(GOLDEN.best.fitness, backend)
     assert GOLDEN.best.fitness == pytest.approx(16.6295712049947)
+
+
+@pytest.mark.filterwarnings("ignore:no C compiler found")
+def test_the_second_demos_best_design_is_worth_what_it_was(backend: Backend) -> None:
+    best = GOLDEN.gait_best
+    assert simulate(best.design).fitness.item() == as_kept(best.fitness, backend)
+    assert best.fitness == pytest.approx(10.45012048)
+
+
+@pytest.mark.thorough("test_the_second_demos_best_design_is_worth_what_it_was")
+@pytest.mark.slow
+def test_the_second_demo_finds_its_best_design(backend: Backend) -> None:
+    if backend == "reference":
+        pytest.skip("NOT TESTED without a C compiler: the reference kernel needs 15 minutes")
+    assert run_gait_demo() == GOLDEN.gait_best
 
 
 @pytest.mark.slow

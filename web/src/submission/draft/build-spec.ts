@@ -3,7 +3,7 @@
 import type { FieldError } from '../../api/problem'
 import type { JobSpec, Variable } from '../../api/types'
 import type { Draft } from './draft'
-import { number, settingValues, startOf } from './settings'
+import { constraintsOf, number, settingValues, startOf } from './settings'
 
 /** Errors by form field: `iterations`, `custom.0.radius`, `variables.FI1R.low`, ... */
 export type FieldErrors = ReadonlyMap<string, string>
@@ -30,6 +30,7 @@ export function specOf(draft: Draft): JobSpec {
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
+    constraints: constraintsOf(draft.constraints),
     ...(draft.case !== null && { case: settingValues(draft.case) }),
     ...(worlds !== undefined && { worlds }),
     optimizer: settingValues(draft.optimizer),

@@ -6,6 +6,7 @@ import { type Catalogue, ofLegGroups, variablesOf } from './catalogue'
 import {
   type CaseDraft,
   caseOf,
+  constraintsText,
   NO_START,
   type OptimizerDraft,
   optimizerDraft,
@@ -56,6 +57,8 @@ export interface Draft {
   readonly custom: readonly Readonly<Record<string, string>>[]
   readonly variables: Readonly<Record<string, VariableDraft>>
   readonly preference: PreferenceDraft
+  /** One per line. */
+  readonly constraints: string
   readonly case: CaseDraft
   readonly worlds: WorldsDraft
   readonly optimizer: OptimizerDraft
@@ -85,6 +88,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     custom: [],
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, usual('preference')),
+    constraints: '',
     case: null,
     worlds: worldsDraft(catalogue.fields.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, undefined, defaultMethod(catalogue)),
@@ -144,6 +148,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     custom: scenarios.filter((entry) => typeof entry !== 'string').map(settingTexts),
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
+    constraints: constraintsText(spec.constraints),
     case: caseOf(spec.case, catalogue.cases),
     worlds: worldsDraft(catalogue.fields.worlds, spec.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, defaultMethod(catalogue)),

@@ -148,6 +148,39 @@ export function walksEach({ robust, values }: WorldsDraft): number {
   return robust ? Number.parseInt(values.count, 10) : 1
 }
 
+/** Constraints as text, one per line; those relative to a design are JSON. */
+export function constraintsText(constraints: JobSpec['constraints']): string {
+  const lines = (constraints ?? []).flatMap((entry) => {
+    if (typeof entry === 'string') return [entry]
+    const { scenario = '*', quantity, min, max, relative_to: reference } = entry
+    if (reference && typeof reference === 'object') {
+      return [JSON.stringify({ ...entry, reference: undefined })]
+    }
+    const where = scenario === '*' ? '' : `${scenario}:`
+    const job = reference && !reference.startsWith('published:') ? 'job:' : ''
+    const multiple = reference ? `*${job}${reference}` : ''
+    return [
+      ['>=', min],
+      ['<=', max],
+    ].flatMap(([sign, limit]) =>
+      limit == null ? [] : [`${where}${quantity}${sign}${limit}${multiple}`],
+    )
+  })
+  return lines.join('\n')
+}
+
+/** Inverse of `constraintsText`; lines that are not JSON are passed on, so that the API reports them. */
+export function constraintsOf(text: string): JobSpec['constraints'] {
+  const lines = text.split('\n').map((line) => line.trim())
+  return lines.filter(Boolean).map((line) => {
+    try {
+      return line.startsWith('{') ? JSON.parse(line) : line
+    } catch {
+      return line
+    }
+  })
+}
+
 export interface StartDraft {
   readonly jobs: readonly string[]
   readonly count: string

@@ -5,7 +5,7 @@ import { Segmented } from '../../components/fields/controls'
 import { ChoiceField, Problems, TextField } from '../../components/fields/field'
 import { formatCount } from '../../format/number'
 import { sentence } from '../../format/words'
-import type { FieldErrors } from '../draft/build-spec'
+import { errorsUnder, type FieldErrors } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
 import type { Draft } from '../draft/draft'
 import {
@@ -61,6 +61,16 @@ export function JobSection({ draft, catalogue, errors, onChange }: SectionProps)
           error={errors.get('precision')}
           hint="of the search; the best design is evaluated in double precision"
           onChange={(precision) => onChange({ precision })}
+        />
+        <TextField
+          wide
+          rows={2}
+          label="Constraints"
+          spellcheck={false}
+          hint="optional, one per line: speed>=0.05, slope-fast:speed>=0.03, or *<=published:A"
+          value={draft.constraints}
+          error={errorsUnder(errors, 'constraints').join('; ') || undefined}
+          onChange={(constraints) => onChange({ constraints })}
         />
       </div>
     </Card>

@@ -1,0 +1,38 @@
+"""Constraints of a new job: entered as text, refused by name, kept by a copy of the job."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.examples.servers import ServerProcess
+from tests.web.test_job import fill_in, submitted
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def test_constraints_are_entered_in_the_form_and_kept_by_a_copy_of_the_job(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="status of 422").go("/jobs/new")
+    fill_in(page, "constrained", iterations=2)
+    constraints = page.get_by_label(re.compile("^Constraints"))
+    constraints.fill("sped>=0.05")
+    page.get_by_role("button", name="Submit the job").click()
+    expect(constraints).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_text(re.compile("^0.quantity: unknown quantity 'sped'"))).to_be_visible()
+    text = "speed>=0.001\n*<=3*published:A"
+    constraints.fill(text)
+    page.get_by_role("button", name="Submit the job").click()
+
+    job_id = submitted(page)
+    spec = server.job(job_id)["spec"]
+    speed, published = spec["constraints"]
+    assert (speed["quantity"], speed["min"], speed["relative_to"]) == ("speed", 0.001, None)
+    assert (published["relative_to"], published["max"]) == ("published:A", 3.0)
+    page = visit(server.url).go(f"/jobs/new?clone={job_id}")
+    expect(page.get_by_label(re.compile("^Constraints"))).to_have_value(text)

@@ -87,10 +87,10 @@ def _ranking(ranking: RankingView) -> Parts:
         for design in ranking.top
     )
     yield table(columns + (["F (eq. 3.1)"] if maximized else []), rows)
+    infeasible = f", {ranking.infeasible} of them infeasible" if ranking.infeasible else ""
     agreement = MISSING if ranking.correlation is None else f"{ranking.correlation:.3f}"
     yield (
-        f"{ranking.evaluations} designs, {ranking.infeasible} of them infeasible; fitness of the"
-        " job's best:"
+        f"{ranking.evaluations} designs{infeasible}; fitness of the job's best:"
         f" {number(ranking.fitness_of_present_best)}; rank correlation: {agreement}"
     )
 

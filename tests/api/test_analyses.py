@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.service import JobService
 from tests.api.conftest import Commit, Serve
 
 WHOLE_HISTORIES = {
-    *("get_distribution", "get_particles", "rank_designs", "get_front"),
+    *("get_distribution", "get_particles", "rank_designs", "find_front"),
     *("get_importance", "compare_jobs", "list_convergences"),
     *("get_preference_for", "get_certificate", "get_targets", "get_parameters"),
     "get_evidence",
@@ -34,7 +34,9 @@ class Waiting(JobService):
         return super().columns(job)
 
 
-@pytest.mark.parametrize("question", ["distribution", "front", "importance"])
+@pytest.mark.parametrize(
+    "question", ["distribution", "preference-for?iteration=0&particle=1", "importance"]
+)
 def test_analyses_wait_for_capacity_and_are_rejected_when_the_queue_is_full(
     serve: Serve, service: JobService, job: Job, commit: Commit, question: str
 ) -> None:

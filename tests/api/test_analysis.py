@@ -238,7 +238,9 @@ def test_a_job_that_has_committed_nothing_has_an_empty_ranking(
         ({"preference": "D"}, "preference"),
         ({"preference": {"bias": [0] * 5, "exponent": [0] * 5}}, "preference"),
         ({"preference": "A", "top": 0}, "top"),
-        ({}, "preference"),
+        ({"constraints": ["speed"]}, "constraints.0"),
+        ({"constraints": ["sped>=1"]}, "constraints.0.quantity"),
+        ({"constraints": ["speed>=1", "speed<=0"]}, "constraints.1"),
     ],
 )
 def test_a_ranking_that_makes_no_sense_is_refused(

@@ -16,7 +16,10 @@ pytestmark = pytest.mark.slow
 
 
 def asked(client: httpx2.Client, job: Job, what: str, **parameters: Any) -> httpx2.Response:
-    return client.get(f"/v1/jobs/{job.id}/{what}", params=parameters)
+    path = f"/v1/jobs/{job.id}/{what}"
+    if what == "front":
+        return client.post(path, json=parameters)
+    return client.get(path, params=parameters)
 
 
 def test_a_front_leaves_out_designs_that_failed_and_equal_ones(
@@ -68,6 +71,8 @@ def test_a_design_that_is_dominated_gets_its_best_rank(
     [
         ("front", {"most": 0}, 422, "most"),
         ("front", {"most": 10_001}, 422, "most"),
+        ("front", {"constraints": ["sped>=1"]}, 422, "constraints.0.quantity"),
+        ("front", {"constraints": ["speed>=1e9"]}, 409, "keeps the constraints"),
         ("preference-for", {"iteration": 0}, 422, "particle"),
         ("preference-for", {"iteration": 0, "particle": 4}, 404, "has no design 0.4"),
         ("preference-for", {"iteration": 0, "particle": 0}, 409, "fails in a scenario"),
@@ -78,7 +83,7 @@ def test_what_cannot_be_answered_is_a_problem(
     job: Job,
     commit: Commit,
     what: str,
-    parameters: dict[str, int],
+    parameters: dict[str, Any],
     status: int,
     said: str,
 ) -> None:
@@ -104,6 +109,7 @@ def test_only_tunings_have_a_front(client: httpx2.Client, store: Store, what: st
         kind="identification", recordings=("0" * 32,), variables=("battery_voltage",)
     )
     job, _ = store.create_job(spec)
-    answer = asked(client, job, what, iteration=0, particle=0)
+    place = {} if what == "front" else {"iteration": 0, "particle": 0}
+    answer = asked(client, job, what, **place)
     assert answer.status_code == 422
     assert "only a job that tunes a drive has objectives to trade" in answer.text

@@ -47,6 +47,9 @@ def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
         first = error.errors(include_url=False, include_input=False)[0]
         where = [str(part) for part in first["loc"] if not str(part).startswith("<")]
         message = message_of(first)
+        field, colon, rest = message.partition(": ")
+        if not where and colon and " " not in field:
+            where, message = [field], rest
         raise InvalidRequest(message, field=".".join(where)) from error
 
 

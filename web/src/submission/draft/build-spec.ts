@@ -22,6 +22,7 @@ export function specOf(draft: Draft): JobSpec {
     .map(([name, { value }]) => [name, number(value)])
   const start = startOf(draft.start)
   const worlds = worldsOf(draft)
+  const constraints = constraintsOf(draft.constraints)
   return {
     name: draft.name,
     robot: robotOf(draft),
@@ -30,7 +31,7 @@ export function specOf(draft: Draft): JobSpec {
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
-    constraints: constraintsOf(draft.constraints),
+    ...(constraints.length > 0 && { constraints }),
     ...(draft.case !== null && { case: settingValues(draft.case) }),
     ...(worlds !== undefined && { worlds }),
     optimizer: settingValues(draft.optimizer),

@@ -170,7 +170,7 @@ export function constraintsText(constraints: JobSpec['constraints']): string {
 }
 
 /** Inverse of `constraintsText`; lines that are not JSON are passed on, so that the API reports them. */
-export function constraintsOf(text: string): JobSpec['constraints'] {
+export function constraintsOf(text: string): NonNullable<JobSpec['constraints']> {
   const lines = text.split('\n').map((line) => line.trim())
   return lines.filter(Boolean).map((line) => {
     try {

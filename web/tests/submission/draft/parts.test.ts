@@ -4,6 +4,8 @@ import { specOf } from '../../../src/submission/draft/build-spec'
 import { type Draft, draftOf } from '../../../src/submission/draft/draft'
 import {
   caseDraft,
+  constraintsOf,
+  constraintsText,
   hasEffect,
   settingsOf,
   walksEach,
@@ -120,5 +122,26 @@ describe('fields of the schema', () => {
 
   test('of a missing schema are an error', () => {
     expect(() => fieldsOf(DOCUMENT, 'Nothing')).toThrow('no schema Nothing')
+  })
+})
+
+describe('constraints', () => {
+  test('are lines of text, or JSON where they are relative to a design', () => {
+    const relative = { quantity: '*', relative_to: { P: 0.45 }, max: 1 }
+    const text = [
+      'slope-fast:speed>=0.03',
+      'energy<=0.9*published:A',
+      'speed>=1*job:abc',
+      JSON.stringify(relative),
+    ].join('\n')
+    const constraints = [
+      { quantity: 'speed', scenario: 'slope-fast', min: 0.03, max: null },
+      { quantity: 'energy', scenario: '*', max: 0.9, relative_to: 'published:A' },
+      { quantity: 'speed', scenario: '*', min: 1, relative_to: 'abc' },
+      { ...relative, reference: { walk: { speed: 1 } } },
+    ] as never
+    expect(constraintsText(constraints)).toBe(text)
+    expect(constraintsOf(` ${text}\n\n`)).toEqual([...text.split('\n').slice(0, 3), relative])
+    expect(constraintsOf('{"quantity"')).toEqual(['{"quantity"'])
   })
 })

@@ -46,6 +46,26 @@ class Store(Jobs, Leases, History, Recordings, Audit):
         lease_seconds: duration of a lease from now on, at most `LONGEST_LEASE_SECONDS` [s].
         actor: name of a token, or `LOCAL`, for the audit log.
         quota: limit on what the owner has unfinished; QuotaExceeded beyond it.
+        iteration: index of the iteration, from 0.
+        state: only jobs in it; of a released job failed, paused, or queued, where a pausing one
+            becomes paused.
+        where, reverse: further criteria, and whether to reverse the order.
+        idempotency_key: a repeated request with it creates no second job.
+        command, accept_changes: to apply, and whether a resumed job may continue under a changed
+            provenance.
+        moment: aware time before which entries were added, or jobs ended.
+        states: in which they ended.
+        should_stop: called between transactions; if true, the rest is left to a later call.
+        quarantine_after: consecutive crashes after which a job fails.
+        waiting, error: reason for waiting or failing, for users; None for neither.
+        ask: designs to evaluate.
+        done, following: the iteration, and the next ask; None at the end of the budget.
+        entries, journaled: of different tasks; whether to clear the journal.
+        keys: from `walk_keys`.
+        walk, ids: to store; of the walks.
+        taken, final: notification of an attempt, and whether to give up now.
+        name, scope: of a token; a new name was never used, not by a revoked token either.
+        secret: of a token.
 
     Args:
         database: of the newest schema; closed with the store.

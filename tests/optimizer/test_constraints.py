@@ -131,6 +131,11 @@ def test_a_limit_of_zero_is_exceeded_by_the_value_itself() -> None:
     assert violations == [2.0]
 
 
+def test_a_quantity_without_a_value_keeps_no_limit() -> None:
+    violations, _ = judged(spec("speed<=0.5"), results((0.3, math.nan), (0.3, 0.3)))
+    assert violations == [math.inf, 0.0]
+
+
 def test_feasible_designs_come_first_then_less_violation_and_failures_last() -> None:
     found = results((0.3, 0.3), (0.1, 0.3), (0.3, 0.3), (0.05, 0.3), (0.3, 0.3))
     found[0, :, 0] = 50.0

@@ -118,10 +118,9 @@ def objective_vectors(
 ) -> Floats:
     """Return each design's (r, M) objectives over all scenarios, minimized.
 
-    Objective m is the fitness under a preference that weighs it alone. For a mean
-    over scenarios without worlds, fitness under any preference with these biases is the product of
-    the objectives, each raised to its exponent. A row is +inf if a simulation failed or lacks an
-    objective.
+    Objective m is the fitness under a preference that weighs it alone. For a mean over scenarios
+    without worlds, fitness under any preference with these biases is the product of the objectives,
+    each raised to its exponent. A row is +inf if a simulation failed or lacks an objective.
     """
     result = np.empty((len(columns), len(bias)))
     for m, exponent in enumerate(np.eye(len(bias)).tolist()):

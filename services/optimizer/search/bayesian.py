@@ -56,7 +56,7 @@ class BayesianSettings(SearchSettings):
         default=50,
         ge=2,
         le=500,
-        description="Evaluations after which CMA-ES goes on from the best design.",
+        description="Evaluations after which CMA-ES continues from the best design.",
     )
 
 
@@ -72,7 +72,7 @@ def bayesian(
     The region is about the best design, longer in variables that matter less; it grows with
     success, shrinks with failure (Eriksson et al. 2019), and is as large as at first when it has
     become too small. A design of a batch is chosen as if the fitness of the previous ones were as
-    expected (Kriging believer, Ginsbourger et al. 2010). CMA-ES goes on with small steps.
+    expected (Kriging believer, Ginsbourger et al. 2010). CMA-ES continues with small steps.
     """
     designs = space.designs(_latin_hypercube(space, settings.sample, random))
     fitness = yield space.positions(designs)

@@ -249,10 +249,9 @@ def _resume_hint(job_id: str, place: str) -> str:
 
 
 def _report(job: JobView, verdict: VerdictView, place: str, others: Mapping[str, JobView]) -> Parts:
-    if job.best is None:
-        closest = job.closest
-        yield "no design walks in every scenario" if closest is None else closest.explanation
-    else:
+    if job.best is None and job.closest is None:
+        yield "no design walks in every scenario"
+    elif job.best is not None:
         best = {name: other.best for name, other in others.items() if other.best is not None}
         evaluations = {"best": job.best} | best
         yield design_table(job.spec, {k: e.design for k, e in evaluations.items()})
@@ -260,8 +259,8 @@ def _report(job: JobView, verdict: VerdictView, place: str, others: Mapping[str,
         for name, evaluation in evaluations.items():
             yield f"fitness of {name}: {worth(evaluation)}"
         yield from search_line(job.best)
-        if job.kind == "tuning":
-            yield from verdict_lines(verdict, place)
+    if job.kind == "tuning":
+        yield from verdict_lines(verdict, place)
     rate = job.simulations_per_second
     speed = f" at {rate:.0f} simulations/s" if rate else ""
     saved = f"; {job.evaluations_saved} of them cached" if job.evaluations_saved else ""

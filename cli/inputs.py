@@ -203,13 +203,17 @@ def constraint_choice(
         return []
     chosen: list[Any] = list(limits or ())
     if no_worse_than is not None:
-        design = no_worse_than.startswith(("{", "-")) or no_worse_than.endswith(".json")
-        reference: Any = no_worse_than
-        if design:
-            content = json_object(no_worse_than, "no-worse-than")
-            reference = content.get("design", content)
+        reference = reference_choice(no_worse_than, "no-worse-than")
         chosen.append({"quantity": "*", "relative_to": reference, "max": 1.0})
     return chosen or None
+
+
+def reference_choice(text: str, option: str) -> Any:
+    """Return `published:NAME` or a job's id unchanged, and the unchecked design of JSON."""
+    if not (text.startswith(("{", "-")) or text.endswith(".json")):
+        return text
+    content = json_object(text, option)
+    return content.get("design", content)
 
 
 def preference_choice(text: str) -> Any:

@@ -327,6 +327,8 @@ def verdict_lines(verdict: VerdictView, place: str) -> Iterator[str]:
         yield f"no gain: {verdict.reason}"
     if verdict.widen is not None:
         yield f"to queue a search within wider bounds, run\n  {verdict.widen}{place}"
+    if verdict.relax is not None:
+        yield f"to continue under relaxed constraints, run\n  {verdict.relax}{place}"
 
 
 def verdict_table(verdict: VerdictView) -> Table:

@@ -199,6 +199,7 @@ def open_runtime(
     retention_days: float | None = None,
     audit_days: float | None = None,
     longest_fork: float = math.inf,
+    longest_reference: float = math.inf,
     metrics: Metrics | None = None,
     webhook_hosts: Collection[str] = (),
     webhook_secret: str | None = None,
@@ -218,7 +219,12 @@ def open_runtime(
             notifier = Notifier(store, webhook_hosts, webhook_secret)
             stack.callback(notifier.stop)
             notifier.start()
-        service = JobService(store, longest_job=longest_job, longest_fork=longest_fork)
+        service = JobService(
+            store,
+            longest_job=longest_job,
+            longest_fork=longest_fork,
+            longest_reference=longest_reference,
+        )
         if housekeeping:
             housekeeper = Housekeeping(store, retention_days, audit_days)
             housekeeper.start()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from gaitswarm.cli.options import (
     NoConstraints,
     NoWorseThan,
     Precision,
+    completed_reference,
 )
 from gaitswarm.cli.output import Parts, Printed, note
 from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
@@ -253,11 +255,27 @@ def _importance_lines(view: ImportanceView) -> Iterator[str]:
         )
 
 
-def verdict(job_id: JobId, *, jobs: Jobs) -> Printed:
-    """Compare a job's best design with the published or the start design, by scenario."""
+def verdict(
+    job_id: JobId,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="published:NAME|ID|FILE.json",
+            callback=completed_reference,
+            help="Compare with this published design, a job's best, or a design of a file.",
+        ),
+    ] = None,
+    *,
+    jobs: Jobs,
+) -> Printed:
+    """Compare a job's best design with the published, the start or another one, by scenario."""
+    from gaitswarm.cli.inputs import reference_choice
     from gaitswarm.cli.tables import verdict_lines, verdict_table
 
-    view = jobs.verdict(job_id)
+    reference = None if against is None else reference_choice(against, "against")
+    if isinstance(reference, dict):
+        reference = json.dumps(reference)
+    view = jobs.verdict(job_id, against=reference)
     tables = [verdict_table(view)] if view.quantities else []
     return view, [*tables, *verdict_lines(view, jobs.place)]
 

@@ -245,6 +245,7 @@ def _runtime(
         retention_days=settings.retention_days,
         audit_days=settings.audit_days,
         longest_fork=settings.api_max_fork_seconds,
+        longest_reference=settings.api_max_sampled_seconds,
         metrics=metrics,
         webhook_hosts=settings.webhook_hosts,
         webhook_secret=settings.webhook_secret,

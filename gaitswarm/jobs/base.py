@@ -75,7 +75,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
-from gaitswarm.services.optimizer.analysis.reference import with_reference
+from gaitswarm.services.optimizer.analysis.reference import with_other_reference, with_reference
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.analysis.utilities import (
     fitness_by,
@@ -88,6 +88,7 @@ from gaitswarm.services.optimizer.analysis.verdict import VerdictView, verdict
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import (
@@ -620,15 +621,28 @@ class Jobs(ABC):
         return BestView.from_evaluation(best, job.spec)
 
     @analysis("GET /jobs/{job_id}/verdict", "get_verdict", "Judge the best design in words")
-    def verdict(self, job_id: str) -> VerdictView:
+    def verdict(
+        self, job_id: str, *, against: Annotated[str, Field(max_length=10_000)] | None = None
+    ) -> VerdictView:
         """Compare the best design of a tuning job so far with its reference in each scenario, and
-        name variables at a bound and constraints at a limit.
+        name variables at a bound and constraints at a limit; without a feasible design, name what
+        stands in the way.
 
         The reference is the published design of the job's controller and preference, or without one
         the middle of the bounds. It is simulated once and stored with the job; job lists include it
         from then on.
+
+        Args:
+            against: Another reference, which is not stored: `published:NAME`, the id of a job for
+                its best design, or a design as a JSON object of its variables.
         """
-        job, reason = with_reference(self._service.store, self._service.job(job_id))
+        job = self._service.job(job_id)
+        if against is None:
+            job, reason = with_reference(self._service.store, job)
+        else:
+            spec, store = tuning_spec(job_id, job.spec, "a reference"), self._service.store
+            self._context.limits.check_sampled(duration(spec, spec.cases({})), "against")
+            job, reason = with_other_reference(job, spec, against, self._service.job, store.best)
         closest = self._service.closest(job) if job.readable else None
         return verdict(job, self._service.store.best(job_id), reason, closest)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.analysis.reference import with_references
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
-from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
+from gaitswarm.services.optimizer.jobs.documents import checked_spec
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
     MeasuredRates,
@@ -48,6 +48,8 @@ from gaitswarm.sim.identification import RecordedWalk
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
 
+S = TypeVar("S", bound=Spec)
+
 
 class JobService:
     """Submit, control, read and analyze jobs. Thread-safe, as the store is.
@@ -58,6 +60,7 @@ class JobService:
         longest_job: limit on the simulated time of all of a job's simulations [s]; if finite, the
             simulations per iteration are limited as well.
         longest_fork: limit on the time to restore a search for a fork [s].
+        longest_reference: limit on the simulated time of the references of constraints [s].
     """
 
     def __init__(
@@ -66,11 +69,13 @@ class JobService:
         provenance: Callable[[Spec], JobProvenance] = job_provenance,
         longest_job: float = math.inf,
         longest_fork: float = math.inf,
+        longest_reference: float = math.inf,
     ) -> None:
         self.store = store
         self.provenance = provenance
         self.longest_job = longest_job
         self.longest_fork = longest_fork
+        self.longest_reference = longest_reference
         self._rates = MeasuredRates()
         self._histories = HistoryCache(store)
 
@@ -145,11 +150,12 @@ class JobService:
     def _resolved(self, spec: Spec) -> Spec:
         """Look up start designs and the references of constraints, once."""
         started = with_start_designs(spec, self.job, self.columns)
-        return with_references(started, self.job, self.store.best, starts=True)
+        return self._referenced(started, starts=True)
 
-    def _referenced(self, spec: AnySpec) -> AnySpec:
+    def _referenced(self, spec: S, *, starts: bool = False) -> S:
         """Look up the references of constraints."""
-        return with_references(spec, self.job, self.store.best, starts=False)
+        longest = self.longest_reference
+        return with_references(spec, self.job, self.store.best, starts=starts, longest=longest)
 
     def recording(self, recording_id: str) -> RecordedWalk:
         return self.store.recordings([recording_id])[recording_id]
@@ -169,7 +175,7 @@ class JobService:
             return spec
         changed = checked_spec(spec, {"constraints": [c.model_dump() for c in constraints]})
         assert isinstance(changed, JobSpec), "the kind does not change"  # noqa: S101
-        return with_references(changed, self.job, self.store.best, starts=False)
+        return self._referenced(changed)
 
     def closest(self, job: Job) -> ClosestView | None:
         """Return the design of least violation; None without constraints or with a best design."""

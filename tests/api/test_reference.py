@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from unittest.mock import patch
 
@@ -68,6 +69,52 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
     assert client.get(here).json() == found
     (listed,) = client.get("/v1/jobs").json()["items"]
     assert (listed["reference"], listed["gain"]) == (found["reference"], found["gain"])
+
+
+def test_another_reference_is_compared_with_and_not_stored(
+    client: httpx2.Client, store: Store, commit: Commit
+) -> None:
+    spec = tuning()
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    commit(job, 1)
+    here = f"/v1/jobs/{job.id}/verdict"
+    by_default = client.get(here).json()
+    published = client.get("/v1/controllers").json()["items"][0]["published"]["C"]
+    energies = {}
+    for against, name, kind, words in (
+        ("published:C", "C", "published", "published C"),
+        (job.id, job.id, "job", f"the best design of job {job.id}"),
+        (json.dumps(published), "given design", "design", "the given design"),
+    ):
+        found = client.get(here, params={"against": against}).json()
+        assert (found["reference"]["name"], found["reference"]["kind"]) == (name, kind)
+        assert found["sentences"][0].startswith(f"Compared with {words}, ")
+        assert found["gain"] == 1.0 - found["best_fitness"] / found["reference"]["fitness"]
+        (energy,) = (view for view in found["quantities"] if view["unit"] == "J/m")
+        energies[kind] = energy["scenarios"]["brief"]["reference"]
+    assert energies["published"] == energies["design"] != energies["job"]
+    assert client.get(here).json() == by_default
+
+
+@pytest.mark.parametrize(
+    ("against", "message"),
+    [
+        ("published:Z", "no published design 'Z' of fuzzy-pi; known are A, B, C"),
+        ("job:k2q7zr5dm9xw", "there is no job 'k2q7zr5dm9xw'"),
+        ('{"P": 1}', "unknown variable 'P'"),
+        ('{"FI1R": [1]}', "is no design"),
+        ("{", "is no design"),
+    ],
+)
+def test_an_unknown_reference_is_refused_by_name(
+    client: httpx2.Client, store: Store, commit: Commit, against: str, message: str
+) -> None:
+    job, _ = store.create_job(tuning())
+    commit(job, 1)
+    refused = client.get(f"/v1/jobs/{job.id}/verdict", params={"against": against})
+    assert refused.status_code == 422
+    (error,) = refused.json()["errors"]
+    assert error["field"] == "against" and message in error["message"]
 
 
 def test_a_robot_of_ones_own_is_measured_against_the_middle_of_the_bounds(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,15 @@ def test_a_speed_that_no_design_reaches_is_a_result_with_its_reason(
     assert "infeasible" in gaitswarm("history", job["id"], "--db", db).out
     best = gaitswarm("best", job["id"], "--db", db)
     assert best.code != 0 and "instead of at least 0.5 m/s" in best.err
+
+    verdict = gaitswarm("verdict", job["id"], "--db", db, "--json").json
+    assert verdict["sentences"][0].startswith("no design met the constraints; closest is")
+    assert verdict["relax"] in result.out
+    program, *command = shlex.split(verdict["relax"])
+    queued = gaitswarm(*command, "--db", db, "--json")
+    assert (program, queued.code) == ("gaitswarm", 0)
+    assert queued.json["best_fitness"] is not None or queued.json["lineage"]["carried"] == "designs"
+
     again = gaitswarm("optimize", "--resume", job["id"], *given, "--constraint", "speed>=0.6")
     assert "was submitted with another constraints" in again.err
 
@@ -57,6 +67,9 @@ def test_a_job_no_worse_than_the_published_optimum_ends_at_least_as_well(
     assert result.json["gain"] >= 0.0
     walked = result.json["best"]["scenarios"]["short"]["objectives"]
     assert all(walked[name] <= value for name, value in constraint["reference"]["short"].items())
+
+    verdict = gaitswarm("verdict", result.json["id"], "--db", db, "--against", "published:C").out
+    assert "Compared with published C, " in verdict
 
     resumed = gaitswarm(
         *("optimize", "--resume", result.json["id"], *given, "--no-worse-than", "published:A"),

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gaitswarm.services.optimizer.analysis.feasibility import LimitView
 from gaitswarm.services.optimizer.analysis.verdict import (
     QUANTITIES,
     QuantityView,
@@ -19,6 +20,7 @@ from gaitswarm.services.optimizer.analysis.verdict import (
     limits_in_words,
     limits_reached,
     percentage,
+    relaxed,
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.reference import Reference
@@ -152,6 +154,54 @@ def test_over_worlds_a_figure_is_the_geometric_mean_of_worlds_in_which_both_walk
     (energy,) = (view for view in views(ratios, spec) if view.name == "energy")
     assert energy.scenarios["normal-fast"].value == pytest.approx(35.0)
     assert energy.scenarios["normal-fast"].reference == pytest.approx(70.0)
+
+
+def test_overall_changes_weigh_scenarios_as_the_job_does() -> None:
+    ratios = np.ones((3, 6))
+    ratios[1, 3] = 0.5
+    for weights, change in (({}, 0.5 ** (1 / 3)), ({"slope-fast": 4.0}, 0.5 ** (4 / 6))):
+        found = views(ratios, tuning(scenario_weights=weights))
+        (energy,) = (view for view in found if view.name == "energy")
+        assert energy.change == pytest.approx(change - 1.0)
+
+
+def violated(*limits: tuple[str, str, float, float]) -> list[LimitView]:
+    return [
+        LimitView(
+            constraint=constraint, case="slope-fast", quantity="speed", unit="m/s",
+            value=value, relation=relation, limit=limit, excess=abs(value / limit - 1.0),
+        )
+        for constraint, relation, value, limit in limits
+    ]  # fmt: skip
+
+
+def test_constraints_are_relaxed_until_the_closest_design_keeps_them() -> None:
+    band = {"quantity": "torque", "min": 4, "max": 9}
+    spec = tuning(constraints=["speed>=0.05", "*<=published:A", "energy<=80", band])
+    limits = violated(
+        ("speed>=0.05", ">=", 0.045, 0.05),
+        ("speed>=0.05", ">=", 0.04, 0.05),
+        ("*<=published:A", "<=", 8.4, 7.0),
+        (str(spec.constraints[3]), "<=", 10.0, 9.0),
+    )
+    texts = relaxed(spec.constraints, limits)
+    assert texts == [
+        *("speed>=0.03996", "*<=1.201*published:A", "energy<=80", "torque>=4", "torque<=10.01")
+    ]
+    assert tuning(constraints=texts).constraints[0].min == 0.03996
+
+
+@pytest.mark.parametrize(
+    ("constraint", "value"),
+    [
+        ("speed>=0.05", np.nan),
+        ("speed>=0.05", -0.1),
+        ({"quantity": "speed", "min": 1.0, "relative_to": {"P": 0.4, "I": 0.1}}, 0.04),
+    ],
+)
+def test_a_limit_that_no_text_can_relax_has_no_command(constraint: object, value: float) -> None:
+    constraints = tuning(constraints=[constraint]).constraints
+    assert relaxed(constraints, violated((str(constraints[0]), ">=", value, 0.05))) is None
 
 
 def test_constraints_at_their_limit_are_named_with_their_closest_place() -> None:

@@ -161,6 +161,31 @@ def test_a_job_longer_than_is_taken_is_refused_however_it_is_asked_for(store: St
     assert [listed.id for listed in store.jobs().items] == [job.id]
 
 
+def test_references_of_constraints_that_take_too_long_are_refused_by_name(store: Store) -> None:
+    asked = JobSpec.model_validate(
+        {
+            "scenarios": ["1"],
+            "worlds": {"count": 2},
+            "constraints": ["speed>=0.01", "*<=9*published:A", "*<=9*published:B", "torque<=99"],
+        }
+    )
+    # Two references in two worlds, each of three cycles of 1.5 s.
+    JobService(store, longest_reference=18.1).submit(asked)
+    service = JobService(store, longest_reference=17.9)
+    (job,) = store.jobs().items
+    assert isinstance(job.spec, JobSpec)
+    for refused in (
+        lambda: service.submit(asked),
+        lambda: service.estimate(asked),
+        lambda: service.under(job.spec, asked.constraints),
+    ):
+        with pytest.raises(InvalidRequest, match=r"18 s in total, more than the 17\.9 s") as error:
+            refused()
+        assert error.value.field == "constraints.2.relative_to"
+    absolute = [c for c in asked.constraints if c.relative_to is None]
+    service.submit(asked.model_copy(update={"constraints": tuple(absolute)}))
+
+
 def test_a_cycle_time_that_is_searched_counts_by_the_middle_of_its_bounds(store: Store) -> None:
     searched = JobSpec(scenarios=("1",), iterations=4).with_gait_searched()
     seconds = 100 * 3 * 1.3

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.examples.servers import ServerProcess
+from tests.web.conftest import SMALL_JOB
 from tests.web.test_job import fill_in, submitted
 from tests.web.visit import Visit
 
@@ -36,3 +37,14 @@ def test_constraints_are_entered_in_the_form_and_kept_by_a_copy_of_the_job(
     assert (published["relative_to"], published["max"]) == ("published:A", 3.0)
     page = visit(server.url).go(f"/jobs/new?clone={job_id}")
     expect(page.get_by_label(re.compile("^Constraints"))).to_have_value(text)
+
+
+def test_a_job_without_a_feasible_design_says_what_stands_in_the_way_and_what_to_do(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"iterations": 1, "constraints": ["speed>=0.5"]})
+    server.wait_for(job_id, "succeeded")
+    card = visit(server.url).go(f"/jobs/{job_id}").get_by_role("region", name="Verdict")
+    expect(card).to_contain_text("no design met the constraints; closest is")
+    expect(card).to_contain_text("instead of at least 0.5 m/s")
+    expect(card).to_contain_text(f"gaitswarm fork {job_id} --from 1 --iterations 2 --constraint")

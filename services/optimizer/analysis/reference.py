@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 import numpy as np
 from pydantic import Field
@@ -21,14 +21,16 @@ from gaitswarm.services.optimizer.jobs.constraints import (
     PUBLISHED,
     Constraint,
     ReferenceChoice,
+    reference_choice,
 )
+from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import by_design
 from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
 from gaitswarm.services.optimizer.jobs.reference import (
-    START,
+    GIVEN,
     Reference,
     ReferenceKind,
     adapted_to_job,
@@ -67,12 +69,14 @@ class ReferenceView(View):
     """The design that a job's best is compared with."""
 
     name: str = Field(
-        description="Study or preference for which it was published, or `start design`.",
+        description="Study or preference for which it was published, `start design`, the id of a"
+        " job, or `given design`.",
         examples=["A"],
     )
     kind: ReferenceKind = Field(
         default="published",
-        description="`published`, or without one `start`: the middle of the job's bounds.",
+        description="`published`, or without one `start`: the middle of the job's bounds; on"
+        " request `job`, the best design of another one, or `design`.",
     )
     fitness: Finite = Field(
         description="By the job's measure, in double precision [1]; null if it fails.",
@@ -89,21 +93,23 @@ class ReferenceView(View):
 
 def walked_reference(spec: Spec) -> Reference:
     """Simulate the published or start design of a job in the job's cases."""
-    if reference_design(spec) is None:
-        return NONE
-    return _walked(spec.model_dump_json(include=set(_JUDGED_BY)))
-
-
-@lru_cache(maxsize=64)
-def _walked(judged_by: str) -> Reference:
-    spec = JobSpec.model_validate_json(judged_by)
     reference = reference_design(spec)
-    if reference is None:
+    if reference is None or not isinstance(spec, JobSpec):
         return NONE
     name, kind, design = reference
-    outcomes = _simulated(judged_by, spec.controller, tuple(design.items()))
-    objectives, failed = by_design(outcomes)
-    fitness = float(spec.judge(objectives, failed).fitness[0])
+    return _walked(spec, spec.controller, design, name, kind)
+
+
+def _walked(
+    spec: JobSpec,
+    controller: ControllerName,
+    design: Mapping[str, float],
+    name: str,
+    kind: ReferenceKind,
+) -> Reference:
+    judged_by = spec.model_dump_json(include=set(_JUDGED_BY))
+    objectives, failed = by_design(_simulated(judged_by, controller, tuple(design.items())))
+    fitness = float(JobSpec.model_validate_json(judged_by).judge(objectives, failed).fitness[0])
     results = objectives[0].astype("<f8").tobytes()
     return Reference(name, fitness if math.isfinite(fitness) else None, kind, results)
 
@@ -124,11 +130,13 @@ def with_references(
     best_of: Callable[[str], Evaluation | None],
     *,
     starts: bool,
+    longest: float = math.inf,
 ) -> S:
     """Return a spec whose constraints have the values of their references.
 
     The references are simulated in the job's cases, in double precision.
 
+    longest: limit on the simulated time of all references [s].
     starts: whether a job without start designs starts from the references, which keep constraints
     that are relative to them.
 
@@ -136,6 +144,14 @@ def with_references(
     """
     if not isinstance(spec, JobSpec) or not spec.constraints:
         return spec
+    relative = {str(c.relative_to): k for k, c in enumerate(spec.constraints) if c.relative_to}
+    seconds = len(relative) * duration(spec, spec.cases({})) if longest < math.inf else 0.0
+    if relative and seconds > longest:
+        raise InvalidRequest(
+            f"the simulations of the references last {seconds:g} s in total, more than the"
+            f" {longest:g} s allowed; choose fewer references, scenarios, cycles or worlds",
+            field=f"constraints.{max(relative.values())}.relative_to",
+        )
     constraints, start = [], list[dict[str, float | str]]()
     for index, constraint in enumerate(spec.constraints):
         values = None
@@ -242,6 +258,30 @@ def _complete_design(spec: JobSpec, design: Mapping[str, float | str]) -> dict[s
         raise ValueError(str(error)) from error
 
 
+def with_other_reference(
+    job: Job,
+    spec: JobSpec,
+    against: str,
+    job_of: Callable[[str], Job],
+    best_of: Callable[[str], Evaluation | None],
+) -> tuple[Job, str | None]:
+    """Return a job with another reference, which is not stored, and why there is no gain."""
+    if spec.case is not None:
+        raise InvalidRequest("a plug-in evaluates the designs of the job", field="against")
+    try:
+        choice, kind = reference_choice(against), "design"
+        controller, design = _referred(spec, choice, job_of, best_of)
+        name = GIVEN
+        if isinstance(choice, str):
+            name = choice.removeprefix(PUBLISHED)
+            kind = "job" if name == choice else "published"
+        reference = _walked(spec, controller, design, name, cast("ReferenceKind", kind))
+    except (GaitswarmError, SimulationError, ValueError) as error:
+        raise InvalidRequest(str(error), field="against") from error
+    job = replace(job, reference=reference)
+    return job, None if job.gain is not None else _why_none(job)
+
+
 def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
     """Determine and store a job's reference, unless known; return why there is no gain.
 
@@ -269,8 +309,7 @@ def _why_none(job: Job) -> str:
     if reference.name is None:
         return "a plug-in evaluates its designs, and none is a reference"
     if reference.fitness is None:
-        description = START if reference.kind == "start" else f"published design {reference.name}"
-        return f"the {description} fails in one of the scenarios"
+        return f"{reference.title} fails in one of the scenarios"
     return "no design is feasible yet"
 
 

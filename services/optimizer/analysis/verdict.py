@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Final, Literal
@@ -16,6 +17,7 @@ from pydantic import Field
 from gaitswarm.services.optimizer.analysis.bounds import NEAR, End, bound_at, with_wider_bounds
 from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, LimitView, limit_views
 from gaitswarm.services.optimizer.analysis.reference import ReferenceView
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -85,7 +87,9 @@ class QuantityView(View):
     name: str = Field(description="Name of the quantity.", examples=["speed"])
     unit: str = Field(description="Its unit.", examples=["m/s"])
     change: float = Field(
-        description="Relative change of the geometric mean over scenarios [1].", examples=[0.11]
+        description="Relative change of the geometric mean over scenarios, weighted as by the"
+        " job [1].",
+        examples=[0.11],
     )
     judgement: Judgement = Field(description="As of a figure.")
     scenarios: dict[str, FigureView] = Field(description="Figures by scenario.")
@@ -105,7 +109,9 @@ class VerdictView(View):
     """A job's best design compared with its reference, in words and numbers."""
 
     id: JobName
-    reference: ReferenceView | None = Field(description="The published or the start design.")
+    reference: ReferenceView | None = Field(
+        description="The published or the start design, or the one requested."
+    )
     best_fitness: Finite = Field(description="Least fitness of the job so far [1].")
     gain: Finite = Field(
         description="Relative improvement over the reference [1]; null if undefined.",
@@ -130,6 +136,12 @@ class VerdictView(View):
         " null if no wider bounds can be simulated.",
         examples=["gaitswarm fork k2q7zr5dm9xw --from 25 --bounds FI1R=1500:8250"],
     )
+    relax: str | None = Field(
+        default=None,
+        description="While no design is feasible, command that continues under constraints so far"
+        " relaxed that the closest design keeps them; null if no command can state them.",
+        examples=["gaitswarm fork k2q7zr5dm9xw --from 25 --iterations 50 --constraint speed>=0.04"],
+    )
 
 
 def verdict(
@@ -148,7 +160,12 @@ def verdict(
     sentences = [] if closest is None else [f"{closest.explanation}."]
     limits: list[LimitView] = []
     bounds: list[BoundView] = []
-    widen = None
+    widen = relax = None
+    fork = ["gaitswarm", "fork", job.id, "--from", str(job.progress.iterations)]
+    if closest is not None and isinstance(spec, JobSpec):
+        texts = relaxed(spec.constraints, closest.violated)
+        budget = ["--iterations", str(2 * spec.iterations)]
+        relax = texts and shlex.join([*fork, *budget, *_repeated("--constraint", texts)])
     if best is not None and isinstance(spec, JobSpec):
         results = (best.reevaluation or best).objectives
         if reference is not None:
@@ -159,9 +176,8 @@ def verdict(
         bounds, widened = bounds_reached(spec, best.design)
         sentences += bounds_in_words(bounds, len(spec.design_space().variables))
         if widened:
-            options = (("--bounds", f"{name}={ends}") for name, ends in widened.items())
-            call = ("fork", job.id, "--from", str(job.progress.iterations))
-            widen = shlex.join(("gaitswarm", *call, *(word for pair in options for word in pair)))
+            ends = (f"{name}={ends}" for name, ends in widened.items())
+            widen = shlex.join([*fork, *_repeated("--bounds", ends)])
     counts = counted(quantities)
     return VerdictView(
         id=job.id,
@@ -175,7 +191,12 @@ def verdict(
         limits=limits,
         bounds=bounds,
         widen=widen,
+        relax=relax,
     )
+
+
+def _repeated(option: str, values: Iterable[str]) -> Iterator[str]:
+    return chain.from_iterable((option, value) for value in values)
 
 
 def compared(spec: JobSpec, objectives: Floats, reference: Reference) -> list[QuantityView]:
@@ -205,11 +226,14 @@ def compared(spec: JobSpec, objectives: Floats, reference: Reference) -> list[Qu
             if usable[k].any()
         }
         if means:
-            views.append(_quantity(quantity, means))
+            weights = [spec.scenario_weights.get(name, 1.0) for name in means]
+            views.append(_quantity(quantity, means, weights))
     return views
 
 
-def _quantity(quantity: Quantity, means: Mapping[str, Sequence[float]]) -> QuantityView:
+def _quantity(
+    quantity: Quantity, means: Mapping[str, Sequence[float]], weights: Sequence[float]
+) -> QuantityView:
     """means: logarithms of the objective, of the best design and of the reference, by scenario."""
     sign = -1.0 if quantity.reciprocal else 1.0
     figures = {
@@ -221,7 +245,7 @@ def _quantity(quantity: Quantity, means: Mapping[str, Sequence[float]]) -> Quant
         )
         for name, (best, other) in means.items()
     }
-    mean = float(np.mean([best - other for best, other in means.values()]))
+    mean = float(np.average([best - other for best, other in means.values()], weights=weights))
     return QuantityView(
         name=quantity.name,
         unit=quantity.unit,
@@ -255,8 +279,7 @@ def comparison_in_words(
             "worse": f"{change} {quantity.worse}",
         }
         changes[view.judgement].append(texts[view.judgement])
-    kind = "published " if reference.kind == "published" else "the "
-    against = f"Compared with {kind}{reference.name}"
+    against = f"Compared with {reference.title}"
     if gain is not None:
         fitness = _judged(np.log1p(-gain))
         same = fitness == "same"
@@ -325,6 +348,29 @@ def limits_in_words(limits: Sequence[LimitView]) -> Iterator[str]:
         place = f"{first.quantity.replace('_', ' ')} in {first.case}: {first.value:.3g}"
         texts.append(f"{constraint} ({place} {first.unit}{more})")
     yield f"At the limit of a constraint: {listed(texts)}."
+
+
+def relaxed(constraints: Sequence[Constraint], violated: Sequence[LimitView]) -> list[str] | None:
+    """Return constraints as texts, those that are violated relaxed until they are not.
+
+    None if one has no text, or no multiple of its limit suffices.
+    """
+    texts = []
+    for constraint in constraints:
+        changes = {}
+        for side, relation, slack in (("min", ">=", 0.999), ("max", "<=", 1.001)):
+            ratios = [
+                limit.value / limit.limit if limit.value * limit.limit > 0.0 else math.nan
+                for limit in violated
+                if (limit.constraint, limit.relation) == (str(constraint), relation)
+            ]
+            if ratios:
+                ratio = min(ratios) if side == "min" else max(ratios)
+                changes[side] = float(f"{getattr(constraint, side) * ratio * slack:.4g}")
+        if isinstance(constraint.relative_to, dict) or not np.isfinite([*changes.values()]).all():
+            return None
+        texts += constraint.model_copy(update=changes).texts()
+    return texts
 
 
 def bounds_reached(spec: JobSpec, design: Floats) -> tuple[list[BoundView], dict[str, str]]:

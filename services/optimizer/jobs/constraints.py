@@ -14,8 +14,18 @@ from typing import Annotated, Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Objective
 from gaitswarm.sim.variables import VariableName, VariableValue
@@ -27,6 +37,7 @@ ALL: Final = "*"
 
 PUBLISHED: Final = "published:"
 _JOB: Final = "job:"
+"""Of references."""
 
 _TEXT: Final = re.compile(
     r"(?:(?P<scenario>[^:<>=]+):)?(?P<quantity>[^:<>=]+)(?P<sign><=|>=)(?P<limit>[^<>=]+)"
@@ -42,6 +53,18 @@ ReferenceChoice = (
     | Annotated[dict[VariableName, VariableValue], Field(min_length=1, max_length=128)]
 )
 """`published:NAME`, a job's id, or a design."""
+
+_DESIGN: Final = TypeAdapter(dict[VariableName, VariableValue])
+
+
+def reference_choice(text: str) -> ReferenceChoice:
+    """Return the reference of a text; a design is JSON. Raises ValueError."""
+    if not text.lstrip().startswith("{"):
+        return text.removeprefix(_JOB)
+    try:
+        return _DESIGN.validate_json(text)
+    except ValidationError as error:
+        raise ValueError(f"is no design: {message_of(error.errors()[0])}") from error
 
 
 class Constraint(BaseModel):
@@ -103,6 +126,10 @@ class Constraint(BaseModel):
         return OBJECTIVE_NAMES[:5] if self.quantity == ALL else (self.quantity,)
 
     def __str__(self) -> str:
+        return " and ".join(self.texts())
+
+    def texts(self) -> list[str]:
+        """Return the limits in the form of `FORM`, except that a design has none."""
         where = "" if self.scenario == ALL else f"{self.scenario}:"
         reference = self.relative_to
         named = reference if isinstance(reference, str) else "design"
@@ -114,7 +141,7 @@ class Constraint(BaseModel):
                 times = "*" if factor and reference is not None else ""
                 to = "" if reference is None else named
                 limits.append(f"{where}{self.quantity}{sign}{factor}{times}{to}")
-        return " and ".join(limits)
+        return limits
 
 
 def _parsed(choice: object) -> object:

@@ -16,17 +16,20 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from gaitswarm.sim.robot.variant import RobotFiles
 
-ReferenceKind = Literal["published", "start"]
+ReferenceKind = Literal["published", "start", "job", "design"]
 
 START: Final = "start design"
 """Name of the middle of a job's bounds."""
 
+GIVEN: Final = "given design"
+
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The published or start design, evaluated in the cases of a job."""
+    """A design that others are compared with, evaluated in the cases of a job."""
 
-    # study or preference for which it was published, or `START`; None if there is none
+    # study or preference for which it was published, `START`, a job's id, or `GIVEN`; None if there
+    # is none
     name: str | None
     fitness: float | None  # by the job's measure, in double precision; None if it fails in a case
     kind: ReferenceKind = "published"
@@ -35,6 +38,12 @@ class Reference:
     def objectives(self, cases: int) -> NDArray[np.float64]:
         """Return the (K, m) raw objectives, columns as in the objectives of the job."""
         return np.frombuffer(self.results, "<f8").reshape(cases, -1)
+
+    @property
+    def title(self) -> str:
+        """The design in a sentence."""
+        before = {"published": "published", "job": "the best design of job"}.get(self.kind, "the")
+        return f"{before} {self.name}"
 
     def gain(self, fitness: float | None) -> float | None:
         """Return the relative improvement of a fitness over the reference."""

@@ -18,9 +18,9 @@ export interface Gain {
 
 /** Request the verdict, which simulates the reference if it is not stored with the job. */
 export function useGain(job: StoredJob | null): Gain & { readonly verdict: Verdict | null } {
-  const best = job?.kind === 'tuning' ? job.best_fitness : null
+  const value = job?.kind === 'tuning' ? (job.best_fitness ?? job.closest?.violation) : null
   const { data } = useResource(
-    best === null ? null : `verdict ${job!.id} ${best}`,
+    value == null ? null : `verdict ${job!.id} ${value} ${job!.finished_at}`,
     (signal) => get('/v1/jobs/{job_id}/verdict', { path: { job_id: job!.id }, signal }),
     { keep: true, pause: job?.finished_at ? 0 : PAUSE },
   )

@@ -8,7 +8,7 @@ import { change, formatNumber } from '../../format/number'
 import { inWords } from '../../format/words'
 
 export function VerdictCard({ verdict }: { verdict: Verdict }) {
-  const { sentences, quantities, widen } = verdict
+  const { sentences, quantities, widen, relax } = verdict
   const scenarios = [...new Set(quantities.flatMap((q) => Object.keys(q.scenarios)))]
   const columns: readonly Column<string>[] = [
     { key: 'scenario', header: true, value: (scenario) => scenario },
@@ -27,6 +27,12 @@ export function VerdictCard({ verdict }: { verdict: Verdict }) {
           <CopyBlock
             label="the command that queues a search within wider bounds"
             text={`${widen} --server ${location.origin}`}
+          />
+        )}
+        {relax != null && (
+          <CopyBlock
+            label="the command that continues under relaxed constraints"
+            text={`${relax} --server ${location.origin}`}
           />
         )}
       </div>

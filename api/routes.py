@@ -120,9 +120,6 @@ _EARLIER: Final[Responses] = {
     }
 }
 
-MOST_RANKED: Final = 20_000_000
-"""Evaluations times preferences of one request, which take some seconds."""
-
 MOST_NAMES: Final = 10_000
 """Fields in a body, without start designs; each may yield an error."""
 
@@ -204,7 +201,6 @@ async def request_context(
         simulated=settings.api_max_simulated_seconds,
         logged=settings.api_max_logged_seconds,
         sampled=settings.api_max_sampled_seconds,
-        ranked=MOST_RANKED,
     )
     return Context(
         actor=LOCAL if token is None else token.name,

@@ -261,6 +261,8 @@ def _report(job: JobView, verdict: VerdictView, place: str, others: Mapping[str,
         yield from search_line(job.best)
     if job.kind == "tuning":
         yield from verdict_lines(verdict, place)
+    if job.kind == "preferences":
+        note(f"to see what each preference buys, run: gaitswarm preferences {job.id}{place}")
     rate = job.simulations_per_second
     speed = f" at {rate:.0f} simulations/s" if rate else ""
     saved = f"; {job.evaluations_saved} of them cached" if job.evaluations_saved else ""

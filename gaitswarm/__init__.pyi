@@ -7,16 +7,14 @@ from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
 from gaitswarm.optimization import OptimizationResult, optimize
+from gaitswarm.services.optimizer.analysis.candidate_preferences import CandidatePreferencesView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
 from gaitswarm.services.optimizer.analysis.front import FrontView
 from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
-from gaitswarm.services.optimizer.analysis.preferences import (
-    PreferenceForView,
-    RobustPreferencesView,
-)
+from gaitswarm.services.optimizer.analysis.preferences import PreferenceForView
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
 from gaitswarm.services.optimizer.analysis.surface import SurfaceView
@@ -42,6 +40,7 @@ from gaitswarm.services.optimizer.errors import (
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
@@ -77,16 +76,17 @@ from gaitswarm.views.verification import VerificationView
 __all__ = [
     "CONTROLLERS", "MEASUREMENTS", "OBJECTIVES", "PREFERENCES", "PRESETS", "SCENARIOS",
     "AsyncJobs", "AutoSettings", "Backoff", "BayesianSettings", "BestView",
-    "CalibrationSpec", "CertificateSpec", "CertificateView", "CmaEsSettings", "Conflict",
+    "CalibrationSpec", "CandidatePreferencesView", "CertificateSpec", "CertificateView",
+    "CmaEsSettings", "Conflict",
     "DatabaseJobs", "DeSettings", "EvaluationTable", "EvaluationView", "EvaluatorUnavailable",
     "FirmwareView", "Forbidden", "FrontView", "GaitswarmError",
     "HistoryIterationView", "HypeSettings", "IdempotencyConflict", "IdentifiabilityView",
     "IdentificationSpec", "ImportanceView", "Interrupted", "InvalidRequest", "IterationView",
     "JobComparisonView", "JobEnded", "JobEvent", "JobSpec", "JobSummaryView",
     "JobView", "Jobs", "LeaseLost", "NotFound", "OptimizationResult", "Preference",
-    "PreferenceForView", "ProvenanceChanged", "PsoSettings", "QuotaExceeded",
+    "PreferenceForView", "PreferencesSpec", "ProvenanceChanged", "PsoSettings", "QuotaExceeded",
     "RandomSearchSettings", "RankingView", "RecordedWalk", "RobotFiles", "RobotVariant",
-    "RobustPreferencesView", "RobustnessView", "Scenario",
+    "RobustnessView", "Scenario",
     "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
     "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, WithJsonSchema
 
 from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView
-from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
 from gaitswarm.services.optimizer.analysis.robustness import (
     RobustnessRequest,
     RobustnessView,
@@ -20,7 +19,6 @@ from gaitswarm.services.optimizer.analysis.robustness import (
 )
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
 from gaitswarm.services.optimizer.views import DesignValues, View, finite
@@ -573,43 +571,3 @@ def run_robustness(
         cases, sample.designs, robots, request.precision, cpus=cpus, progress=progress
     )
     return robustness_view(request, sample, outcomes)
-
-
-def sampled_indices(
-    spec: JobSpec,
-    request: PreferencesRequest,
-    designs: list[dict[str, float | str]],
-    *,
-    progress: Progress | None = None,
-    check: Callable[[float], None] = lambda _seconds: None,
-) -> list[IndexView | None]:
-    """Simulate samples around designs of a job and estimate the robustness index of each.
-
-    `check` is called with the simulated time of all of them [s].
-    """
-    if spec.case is not None:
-        raise InvalidRequest(
-            f"the job's designs were evaluated by {spec.case.name}, and samples would use"
-            " gaitswarm's simulator; give 0",
-            field="samples",
-        )
-    document = {
-        "robot": spec.robot,
-        "controller": spec.controller,
-        "scenarios": spec.resolved_scenarios(),
-        "variables": spec.design_space().variables,
-        **request.model_dump(include={"samples", "radius", "seed", "precision"}),
-    }
-    requests = [checked(RobustnessRequest, {**document, "design": design}) for design in designs]
-    seconds = sum(one.simulated_seconds(one.resolved_scenarios()) for one in requests)
-    check(seconds * (1 + request.samples))
-    indices = []
-    for number, one in enumerate(requests):
-
-        def overall(done: int, planned: int, before: int = number) -> None:
-            if progress is not None:
-                progress(before * planned + done, len(requests) * planned)
-
-        with simulation_errors("job_id"):
-            indices.append(run_robustness(one, progress=overall).index)
-    return indices

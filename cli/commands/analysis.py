@@ -6,30 +6,28 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Mapping
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from gaitswarm.cli.commands.designs import Radius, Samples, Seed, shown_progress
 from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import (
     ConstraintOption,
     JobId,
     NoConstraints,
     NoWorseThan,
-    Precision,
-    ScenarioAggregate,
-    ScenarioWeight,
     completed_reference,
 )
 from gaitswarm.cli.output import Parts, Printed, note
-from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
+from gaitswarm.cli.tables import MISSING, SHORT, Bold, number, percent, place, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
+    from gaitswarm.services.optimizer.analysis.candidate_preferences import (
+        CandidatePreferencesView,
+    )
     from gaitswarm.services.optimizer.analysis.failures import FailuresView
     from gaitswarm.services.optimizer.analysis.front import (
         FrontView,
@@ -44,7 +42,6 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.analysis.preferences import (
         PreferenceFitView,
         PreferenceForView,
-        RobustPreferencesView,
     )
     from gaitswarm.services.optimizer.analysis.ranking import RankingView
 
@@ -62,21 +59,17 @@ def rank(
     constraint: ConstraintOption = None,
     no_worse_than: NoWorseThan = None,
     no_constraints: NoConstraints = False,
-    scenario_weight: ScenarioWeight = None,
-    scenario_aggregate: ScenarioAggregate = None,
     top: Annotated[int, typer.Option(help="Number of designs to show.")] = 20,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """Rank a job's stored designs by another preference, other constraints or weights."""
-    from gaitswarm.cli.inputs import constraint_choice, preference_choice, weights_choice
+    """Rank a job's stored designs by another preference or other constraints."""
+    from gaitswarm.cli.inputs import constraint_choice, preference_choice
 
     ranking = jobs.ranking(
         job_id,
         None if preference is None else preference_choice(preference),
         constraints=constraint_choice(constraint, no_worse_than, none=no_constraints),
-        scenario_weights=weights_choice(scenario_weight),
-        scenario_aggregate=scenario_aggregate,  # type: ignore[arg-type]
         top=top,
     )
     return ranking, _ranking(ranking)
@@ -311,77 +304,75 @@ def _failures(view: FailuresView) -> Parts:
 
 def preferences(
     job_id: JobId,
-    drawn: Annotated[int, typer.Option(help="Preferences to sample besides A, B and C.")] = 512,
-    candidates: Annotated[
-        int, typer.Option(help="Winners to simulate, besides those of A, B and C.")
-    ] = 8,
-    samples: Samples = 128,
-    radius: Radius = 0.02,
-    seed: Seed = 1,
-    precision: Precision = None,
     for_design: Annotated[
         str | None,
         typer.Option(
             "--for",
             metavar="ITERATION.DESIGN",
-            help="Instead, find the preference under which this design of the job wins, without"
+            help="Find the preference under which this design of a tuning job wins, without"
             " simulation.",
         ),
     ] = None,
     *,
+    search: Annotated[
+        bool,
+        typer.Option(
+            help="Submit a search for preferences around a tuning job; it judges the design that is"
+            " optimal under each.",
+        ),
+    ] = False,
     jobs: Jobs,
 ) -> Printed:
-    """Find preferences whose winner among a job's designs is robust (thesis 4.5).
+    """Show what each preference of a search buys (thesis 4.5, 4.6), or submit such a search.
 
-    Ranks stored designs under many preferences, and estimates the robustness index of the winners
-    by simulation. With --for, finds the preference that makes a design the best.
+    A search judges the optimum of each preference by its robustness and its evenness over the
+    scenarios. With --for, finds the preference that makes a design the best.
     """
-    from gaitswarm.services.optimizer.analysis.preferences import (
-        PreferencesRequest,
-        robust_preferences,
-    )
+    from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
+    from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
     from gaitswarm.settings import read_place
-    from gaitswarm.simulation import sampled_indices
-    from gaitswarm.specs import checked
 
     if for_design is not None:
         iteration, particle = read_place(for_design, field="for")
         fits = jobs.preference_for(job_id, iteration, particle)
         return fits, _fits(fits)
-    options = {
-        "drawn": drawn,
-        "candidates": candidates,
-        "samples": samples,
-        "radius": radius,
-        "seed": seed,
-        "precision": precision,
-    }
-    request = checked(PreferencesRequest, options)
-    spec, columns = jobs.job(job_id).spec, jobs.evaluations(job_id).evaluations
-    with shown_progress() as progress:
-        index = partial(sampled_indices, progress=progress)
-        view = robust_preferences(job_id, spec, columns, request, index)
-    return view, _preferences(view)
+    if search:
+        tuned = tuning_spec(job_id, jobs.job(job_id).spec, "preferences")
+        submitted = jobs.submit(PreferencesSpec.of_job(job_id, tuned))
+        command = f"gaitswarm preferences {submitted.id}{jobs.place}"
+        return submitted, iter([f"job {submitted.id}; to see its preferences, run\n  {command}"])
+    view = jobs.preferences(job_id)
+    return view, _candidates(view)
 
 
-def _preferences(view: RobustPreferencesView) -> Parts:
-    rows = (
-        (
-            place(candidate),
-            *interval(candidate.index),
-            ", ".join([*candidate.named, f"{100.0 * candidate.share:.0f} %"]),
-            number(candidate.fitness),
-            percent(candidate.loss, 2),
-            " ".join(number(value, 2) for value in candidate.preference.bias),
-            " ".join(number(value, 2) for value in candidate.preference.exponent),
-        )
-        for candidate in view.candidates
-    )
-    heads = ("index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")
-    yield table(["design", *(f"<{head}" for head in heads)], rows)
+_BOUGHT: Final = ("torque", "acceleration", "angular_acceleration", "energy", "speed", "slowest")
+
+
+def _candidates(view: CandidatePreferencesView) -> Parts:
+    """Yield what each candidate preference buys, the recommended one first."""
+    rows = [
+        [
+            *("reference", *[MISSING] * 5),
+            *(number(view.reference_figures[name], 3) for name in _BOUGHT),
+        ]
+    ]
+    for c in view.candidates:
+        cells = [
+            c.named or place(c),
+            *(number(value, 3) for value in (c.fitness, c.sensitivity)),
+            *(percent(c.failures, 2), number(c.risk, 3), number(c.unevenness, 3)),
+            *(f"{100.0 * c.changes[name]:+.0f} %" for name in _BOUGHT),
+        ]
+        rows.append(Bold(cells) if c.recommended else cells)
+    criteria = ("factor", "index", "failed %", "risk", "uneven")
+    figures = ("torque\nN m", "accel.\nm/s2", "ang.acc.\nrad/s2", "energy\nJ/m", "speed\nm/s")
+    yield table(["preference", *criteria, *figures, "slowest\nm/s"], rows, gap=1)
+    first = view.candidates[0]
+    yield f"recommended: {first.preference.model_dump_json()}"
     yield (
-        f"{view.winners} designs of the job win under A, B, C or any of {view.drawn} sampled"
-        " preferences; smaller indices are more robust; fitness and loss use the job's preference"
+        f"factor: by which objectives may get worse, exp(0.05 index) risk uneven / (1 - failed)\n"
+        f"index: sensitivity to the variables, from {view.samples} designs around the optimum\n"
+        f"failed, risk: in {view.worlds} held-out worlds; uneven: over the scenarios"
     )
 
 

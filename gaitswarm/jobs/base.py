@@ -42,6 +42,10 @@ from gaitswarm.jobs.operation import (
     robots,
 )
 from gaitswarm.recordings import RecordingEntryView, RecordingView
+from gaitswarm.services.optimizer.analysis.candidate_preferences import (
+    CandidatePreferencesView,
+    candidate_preferences,
+)
 from gaitswarm.services.optimizer.analysis.certificate import (
     MOST_WORST,
     CertificateView,
@@ -69,10 +73,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView, importance
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
-    PreferencesRequest,
-    RobustPreferencesView,
     preference_for,
-    robust_preferences,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
 from gaitswarm.services.optimizer.analysis.reference import with_other_reference, with_reference
@@ -86,6 +87,7 @@ from gaitswarm.services.optimizer.analysis.utilities import (
 )
 from gaitswarm.services.optimizer.analysis.verdict import VerdictView, verdict
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
@@ -101,15 +103,13 @@ from gaitswarm.services.optimizer.jobs.job import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.identification import RecordedWalk
-from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.simulation import sampled_indices
 from gaitswarm.specs import (
     ConstraintInput,
     ForkOptions,
@@ -697,7 +697,7 @@ class Jobs(ABC):
     @analysis(
         "POST /jobs/{job_id}/ranking",
         "rank_designs",
-        "Rank designs under another preference, other constraints or weights",
+        "Rank designs under another preference or other constraints",
         body=RankingRequest,
     )
     def ranking(
@@ -706,11 +706,9 @@ class Jobs(ABC):
         preference: PreferenceInput | None = None,
         *,
         constraints: Sequence[ConstraintInput] | None = None,
-        scenario_weights: Mapping[str, float] | None = None,
-        scenario_aggregate: ScenarioAggregate | None = None,
         top: int = 20,
     ) -> RankingView:
-        """Rank all designs of a job under another preference, other constraints or weights.
+        """Rank all designs of a job under another preference or other constraints.
 
         Stored results are judged; at most references of constraints are simulated.
 
@@ -719,8 +717,6 @@ class Jobs(ABC):
                 `Preference`; None: as by the job.
             constraints: Limits that a design must keep, such as "speed>=0.05"; None: those of the
                 job, an empty list: none.
-            scenario_weights: Weights of scenarios in the mean, by name; None: those of the job.
-            scenario_aggregate: `mean` or `worst`; None: that of the job.
             top: How many of the best designs to list, 1 to 1000.
         """
         job = self._service.job(job_id)
@@ -730,13 +726,9 @@ class Jobs(ABC):
                 " preference",
                 field="preference",
             )
-        spec = self._service.under(
-            job.spec,
-            preference=preference,
-            constraints=constraints,
-            scenario_weights=scenario_weights,
-            scenario_aggregate=scenario_aggregate,
-        )
+        spec = self._service.under(job.spec, cast("Sequence[Constraint] | None", constraints))
+        if preference is not None:
+            spec = spec.model_copy(update={"preference": preference})
         return rank(self._service.columns(job), spec, top=top)
 
     def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
@@ -797,53 +789,6 @@ class Jobs(ABC):
         ]
         return comparison(self._service.store, jobs, fitness)
 
-    @analysis(
-        "POST /jobs/{job_id}/preferences",
-        "find_robust_preferences",
-        "Rank designs under many preferences",
-        body=PreferencesRequest,
-    )
-    def preferences(
-        self,
-        job_id: str,
-        *,
-        drawn: int = 512,
-        candidates: int = 8,
-        samples: int = 0,
-        radius: float = 0.02,
-        seed: int = 1,
-        precision: Precision = "double",
-    ) -> RobustPreferencesView:
-        """Find the preference whose winner among a job's designs is the most robust.
-
-        The winners' robustness index is estimated on request, by simulations where the jobs are.
-
-        Args:
-            drawn: Preferences to draw in addition to A, B and C (table 4.5), 1 to 100000.
-            candidates: Winners to list: those of A, B and C, and of the others those that win under
-                most preferences.
-            samples: Designs to simulate around each of them; 0 for no simulation and no index.
-            radius: Largest distance from it, as a share of each variable's bounds.
-            seed: Of preferences and samples.
-            precision: Of the physics.
-
-        Raises:
-            Conflict: No design of it succeeds in all scenarios.
-        """
-        request = PreferencesRequest(
-            drawn=drawn,
-            candidates=candidates,
-            samples=samples,
-            radius=radius,
-            seed=seed,
-            precision=precision,
-        )
-        limits, job = self._context.limits, self._service.job(job_id)
-        limits.check_ranked(drawn, job)
-        spec, columns = self._feasible(job_id, "a preference")
-        index = partial(sampled_indices, check=limits.check_sampled)
-        return robust_preferences(job_id, spec, columns, request, index)
-
     @analysis("POST /jobs/{job_id}/front", "find_front", "Find the Pareto front", body=FrontRequest)
     def front(
         self,
@@ -865,7 +810,7 @@ class Jobs(ABC):
         spec, columns = self._tuning(job_id, "objectives to trade")
         vectors = objective_vectors(columns, aggregation=spec.aggregation)
         if constraints is not None:
-            spec = self._service.under(spec, constraints=constraints)
+            spec = self._service.under(spec, cast("Sequence[Constraint]", constraints))
             preference = spec.resolved_preference()
             own = fitness_by(columns, preference, aggregation=spec.aggregation)
             columns = replace(columns, fitness=own)
@@ -991,6 +936,26 @@ class Jobs(ABC):
             )
         columns = self._service.columns(job)
         return certificate(job_id, job.spec, columns, worlds=worlds, most=most)
+
+    @analysis(
+        "GET /jobs/{job_id}/preferences",
+        "get_preferences",
+        "Get the results of a search for preferences",
+    )
+    def preferences(self, job_id: str) -> CandidatePreferencesView:
+        """List the preferences of a job of kind `preferences`, and what their optima are worth.
+
+        Raises:
+            Conflict: None of them has a feasible optimum yet.
+        """
+        job = self._service.job(job_id)
+        if not isinstance(job.spec, PreferencesSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only a search for preferences has"
+                " candidates; to submit one, run gaitswarm preferences ID --search",
+                field="job_id",
+            )
+        return candidate_preferences(job_id, job.spec, self._service.columns(job))
 
     @analysis(
         "GET /jobs/{job_id}/export",

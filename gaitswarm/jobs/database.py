@@ -28,6 +28,7 @@ from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import evaluations_of
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -250,6 +251,8 @@ def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
 
 def _submitted(spec: Spec) -> Spec:
     """Return a spec without what is looked up at submission."""
+    if isinstance(spec, PreferencesSpec):
+        return spec.model_copy(update={"tuning": _submitted(spec.tuning)})
     return spec.without_references() if isinstance(spec, JobSpec) else spec
 
 

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.job import Job, Quota
+from gaitswarm.services.optimizer.jobs.job import Quota
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.services.optimizer.views import Request
 from gaitswarm.specs import SpecOptions, checked, chosen_spec
@@ -55,13 +55,11 @@ class Limits:
         simulated: Length of all simulations [s].
         logged: The same, of simulations with logs [s].
         sampled: The same, of samples of designs [s].
-        ranked: Evaluations times preferences [1].
     """
 
     simulated: float = math.inf
     logged: float = math.inf
     sampled: float = math.inf
-    ranked: float = math.inf
 
     def check(self, seconds: float, *, field: str, logged: bool = False) -> None:
         """Reject simulations that are too long in total."""
@@ -71,16 +69,6 @@ class Limits:
     def check_sampled(self, seconds: float, field: str = "samples") -> None:
         """Reject samples of designs or of evaluations whose simulations are too long in total."""
         _check_length(seconds, self.sampled, "allowed; choose fewer", field)
-
-    def check_ranked(self, preferences: int, job: Job) -> None:
-        """Reject too many preferences for the evaluations of a job."""
-        evaluations = job.progress.evaluations
-        most = max(1.0, self.ranked / max(1, evaluations))
-        if preferences > most:
-            raise InvalidRequest(
-                f"must be at most {math.floor(most)} for the {evaluations} evaluations of this job",
-                field="drawn",
-            )
 
 
 def _check_length(seconds: float, limit: float, advice: str, field: str) -> None:

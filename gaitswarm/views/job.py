@@ -161,7 +161,7 @@ class EstimateView(View):
     )
 
 
-JobKind = Literal["tuning", "identification", "calibration", "certificate"]
+JobKind = Literal["tuning", "identification", "calibration", "certificate", "preferences"]
 
 
 class JobSummaryView(View):

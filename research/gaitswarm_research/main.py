@@ -17,7 +17,6 @@ from gaitswarm_research.studies.constraints import constraints
 from gaitswarm_research.studies.controllers import controllers
 from gaitswarm_research.studies.drives import drives
 from gaitswarm_research.studies.precision import precision
-from gaitswarm_research.studies.preferences import preferences
 from gaitswarm_research.studies.worlds import worlds
 
 app = typer.Typer(
@@ -38,8 +37,8 @@ app.command()(bbob)
 app.command()(reconstruction)
 study = typer.Typer(
     no_args_is_help=True,
-    help="Measure effects of tables, time steps, noise, precision, controllers, worlds, drives,"
-    " preferences and constraints.",
+    help="Measure effects of tables, time steps, noise, precision, controllers, worlds, drives"
+    " and constraints.",
 )
 for command in (
     tables,
@@ -49,7 +48,6 @@ for command in (
     controllers,
     worlds,
     drives,
-    preferences,
     constraints,
 ):
     study.command()(command)

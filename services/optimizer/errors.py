@@ -44,6 +44,17 @@ class InvalidRequest(GaitswarmError, ValueError):
         super().__init__(f"{field}: {message}" if field else message)
 
 
+@contextmanager
+def within(field: str) -> Iterator[None]:
+    """Name the field in whose document another one is invalid."""
+    try:
+        yield
+    except InvalidRequest as error:
+        message = str(error).removeprefix(f"{error.field}: ")
+        inner = f".{error.field}" if error.field else ""
+        raise InvalidRequest(message, field=f"{field}{inner}") from error
+
+
 class NotFound(GaitswarmError):
     """No such job or iteration."""
 

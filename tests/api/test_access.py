@@ -25,7 +25,7 @@ Bearer = Callable[[Scope], dict[str, str]]
 
 QUESTIONS = {
     *("rank_designs", "controller_surface", "estimate_job", "simulate", "estimate_robustness"),
-    *("find_robust_preferences", "find_front", "draft_robot", "check_robot"),
+    *("find_front", "draft_robot", "check_robot"),
     *("replay", "verify_history", "begin_session", "end_session"),
 }
 """Operations that are no GET, and yet change nothing that is stored."""

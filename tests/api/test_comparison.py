@@ -9,8 +9,8 @@ import httpx2
 import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import PARTICLES, Commit

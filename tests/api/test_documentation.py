@@ -56,7 +56,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/particles",
         f"post {job}/ranking",
         f"get {job}/failures",
-        f"post {job}/preferences",
+        f"get {job}/preferences",
         f"get {job}/firmware",
         f"get {job}/firmware/summary",
         f"post {job}/front",
@@ -154,7 +154,7 @@ def test_every_error_is_a_problem(document: Document) -> None:
 def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
     schemas = document["components"]["schemas"]
 
-    named = ("Job", "Identification", "Calibration", "Certificate")
+    named = ("Job", "Identification", "Calibration", "Certificate", "Preferences")
     kinds = [f"{kind}Spec" for kind in named]
     assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
     spec, null = schemas["JobView"]["properties"]["spec"]["anyOf"]

@@ -93,7 +93,7 @@ def test_a_job_hears_of_its_own_kind_alone() -> None:
 
 def test_an_unknown_kind_hears_of_the_known() -> None:
     assert messages({"kind": "magic"}) == {
-        "kind": "must be tuning, identification, calibration or certificate"
+        "kind": "must be tuning, identification, calibration, certificate or preferences"
     }
 
 

@@ -1,83 +1,78 @@
-"""Preferences with robust winners over HTTP."""
+"""Searches for preferences over HTTP: submitted, run, and read as any job; what candidates buy."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import httpx2
 import pytest
 
-from gaitswarm.api.routes import MOST_RANKED
-from gaitswarm.services.optimizer.jobs.job import Job
-from tests.api.conftest import Commit, Serve
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.preferences import DOCUMENT
 
 pytestmark = pytest.mark.slow
 
 
-def test_winners_are_listed_from_what_is_stored(
-    client: httpx2.Client, job: Job, commit: Commit
+def finished(client: httpx2.Client, store: Store) -> str:
+    answer = client.post("/v1/jobs", json=DOCUMENT)
+    assert answer.status_code == 202, answer.text
+    evaluator = open_evaluator("in-process", cpus=2)
+    try:
+        run_embedded(store, evaluator, answer.json()["id"])
+    finally:
+        evaluator.close()
+    return f"/v1/jobs/{answer.json()['id']}"
+
+
+def test_candidates_are_listed_by_their_fitness_against_the_reference(
+    client: httpx2.Client, store: Store
 ) -> None:
-    commit(job, 2)
-    path = f"/v1/jobs/{job.id}/preferences"
-    view = client.post(path, json={"drawn": 64, "seed": 3}).json()
-    assert (view["drawn"], view["seed"], view["samples"]) == (64, 3, 0)
-    # The results are made up: one particle is the best in every objective.
-    (only,) = view["candidates"]
-    assert (only["particle"], only["named"], only["share"]) == (1, ["A", "B", "C"], 1.0)
-    assert only["index"] is None
+    path = finished(client, store)
+    job = client.get(path).json()
+    assert (job["kind"], job["state"], job["evaluations"]) == ("preferences", "succeeded", 4)
+    view = client.get(f"{path}/preferences").json()
+    candidates = view["candidates"]
+    assert {c["named"] for c in candidates} == {"A", "B", "C", None}
+    assert [c["recommended"] for c in candidates] == [True, False, False, False]
+    fitness = [c["fitness"] for c in candidates]
+    assert fitness == sorted(fitness) and fitness[0] == job["best_fitness"]
+    assert (view["evaluated"], view["worlds"], view["samples"]) == (4, 3, 12)
+    for candidate in candidates:
+        assert set(candidate["design"]) == set(view["reference"]) == {"P", "I"}
+        assert set(candidate["figures"]) == set(view["reference_figures"])
+        for name, change in candidate["changes"].items():
+            reference = view["reference_figures"][name]
+            assert candidate["figures"][name] == pytest.approx(reference * (1.0 + change))
 
 
-def test_the_winner_walks_on_request(client: httpx2.Client, job: Job, commit: Commit) -> None:
-    commit(job, 1)
-    asked = {"drawn": 4, "samples": 48}
-    view = client.post(f"/v1/jobs/{job.id}/preferences", json=asked).json()
-    (only,) = view["candidates"]
-    design = {
-        "design": only["design"],
-        "scenarios": ["normal-fast", "turn-right-fast"],
-        "samples": 48,
-    }
-    own = client.post("/v1/robustness", json=design).json()
-    assert only["index"] == own["index"] is not None
+def test_the_estimate_counts_searches_samples_and_worlds(client: httpx2.Client) -> None:
+    estimate = client.post("/v1/estimates", json=DOCUMENT).json()
+    assert (estimate["evaluations"], estimate["walks"]) == (4, 4)
+    # 8 designs and 14 of the sample in steps of 1.0 and 1.5 s, and 4 worlds in held-out ones, too.
+    assert estimate["simulated_seconds"] > 4 * (8 + 14 + 4) * 2.5
+    assert estimate["seconds"] > 0.0
 
 
-@pytest.mark.parametrize(
-    ("asked", "field"),
-    [
-        ({"drawn": 0}, "drawn"),
-        ({"candidates": 0}, "candidates"),
-        ({"samples": 9}, "samples"),
-        ({"radius": 0.9}, "radius"),
-        ({"precision": "half"}, "precision"),
-        ({"tolerance": 1}, "tolerance"),
-        ({"drawn": MOST_RANKED}, "drawn"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_by_field(
-    client: httpx2.Client, job: Job, commit: Commit, asked: dict[str, Any], field: str
+def test_a_job_begins_with_the_best_designs_of_another_one(
+    client: httpx2.Client, store: Store
 ) -> None:
-    commit(job, 1)
-    answer = client.post(f"/v1/jobs/{job.id}/preferences", json=asked)
-    assert answer.status_code == 422
-    assert [error["field"] for error in answer.json()["errors"]] == [field]
+    tuned = client.post("/v1/jobs", json=SMALL_SPEC).json()["id"]
+    evaluator = open_evaluator("in-process", cpus=2)
+    run_embedded(store, evaluator, tuned)
+    evaluator.close()
+    start = {"jobs": [tuned], "count": 2}
+    tuning = {key: SMALL_SPEC[key] for key in ("scenarios", "optimizer")} | {"start": start}
+    job = client.post("/v1/jobs", json=DOCUMENT | {"tuning": tuning, "samples": 36}).json()
+    first, *_ = job["spec"]["tuning"]["start"]
+    assert first == client.get(f"/v1/jobs/{tuned}/best").json()["design"]
+    unknown = tuning | {"start": {"jobs": ["nothing"]}}
+    refused = client.post("/v1/jobs", json=DOCUMENT | {"tuning": unknown, "samples": 36})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "tuning.start.jobs.0"
 
 
-def test_what_takes_too_long_is_refused(
-    serve: Serve, job: Job, commit: Commit, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    commit(job, 1)
-    server = serve(api_max_sampled_seconds=100.0)
-    path = f"/v1/jobs/{job.id}/preferences"
-    walked = server.client.post(path, json={"samples": 48})
-    assert walked.status_code == 422
-    (error,) = walked.json()["errors"]
-    assert error["field"] == "samples" and "more than the 100 s allowed" in error["message"]
-    monkeypatch.setattr("gaitswarm.api.routes.MOST_RANKED", 400)
-    ranked = server.client.post(path, json={"drawn": 101})
-    assert "drawn: must be at most 100 for the 4 evaluations" in ranked.json()["detail"]
-    assert server.client.post(path, json={"drawn": 100}).status_code == 200
-
-
-def test_a_job_has_no_winners_before_its_first_iteration(client: httpx2.Client, job: Job) -> None:
-    assert client.post(f"/v1/jobs/{job.id}/preferences", json={}).status_code == 409
-    assert client.post("/v1/jobs/nosuchjob/preferences", json={}).status_code == 404
+def test_only_a_search_for_preferences_has_candidates(client: httpx2.Client) -> None:
+    tuned = client.post("/v1/jobs", json=SMALL_SPEC).json()["id"]
+    refused = client.get(f"/v1/jobs/{tuned}/preferences")
+    assert refused.status_code == 422
+    assert "only a search for preferences has candidates" in refused.text

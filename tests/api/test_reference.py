@@ -18,9 +18,9 @@ from gaitswarm.services.optimizer.analysis.reference import (
 )
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
-from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import RESULTS
 from gaitswarm.views.job import JobSummaryView

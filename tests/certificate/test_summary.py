@@ -8,11 +8,13 @@ import pytest
 from gaitswarm.services.optimizer.analysis.certificate import (
     CertificateView,
     certificate,
-    conditional_value_at_risk,
     proportion,
 )
 from gaitswarm.services.optimizer.errors import Conflict
-from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import (
+    CertificateSpec,
+    conditional_value_at_risk,
+)
 from gaitswarm.sim.outcome import Status
 from tests.certificate.examples import columns, small
 

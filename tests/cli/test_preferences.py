@@ -1,65 +1,36 @@
-"""`gaitswarm preferences`: preferences with robust winners."""
+"""`gaitswarm preferences`: searches for preferences with robust optima."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Finished, Gaitswarm
+from tests.examples.preferences import DOCUMENT
 
 pytestmark = pytest.mark.slow
 
 
-def test_winners_are_listed_by_how_robust_they_are(
-    gaitswarm: Gaitswarm, finished: Finished
+def test_a_search_of_a_job_is_submitted_and_shows_what_each_preference_buys(
+    gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
 ) -> None:
-    asked = (
-        "preferences", finished.id, "--db", finished.db, "--drawn", 32, "--candidates", 2,
-        "--samples", 40,
-    )  # fmt: skip
-    result = gaitswarm(*asked, "--json")
-    assert result.code == 0, result.err
-    view = result.json
-    candidates = view["candidates"]
-    assert (view["drawn"], view["samples"]) == (32, 40)
-    assert 1 <= len(candidates) <= view["winners"]
-    assert sorted(name for found in candidates for name in found["named"]) == ["A", "B", "C"]
-    indices = [found["index"]["value"] for found in candidates]
-    assert indices == sorted(indices)
+    db = tmp_path / "jobs.db"
+    spec = tmp_path / "preferences.json"
+    spec.write_text(json.dumps(DOCUMENT))
+    ended = gaitswarm("optimize", "--spec", spec, "--db", db, "--json")
+    assert ended.code == 0, ended.err
+    shown = gaitswarm("preferences", ended.json["id"], "--db", db)
+    assert shown.code == 0, shown.err
+    assert "reference" in shown.out
+    assert "recommended: {" in shown.out
+    candidates = gaitswarm("preferences", ended.json["id"], "--db", db, "--json").json["candidates"]
+    assert {c["named"] for c in candidates} == {"A", "B", "C", None}
 
-    # By the reported preference, the design is the best of the job; its index is that of
-    # `robustness`.
-    first = candidates[0]
-    by_a = next(found for found in candidates if "A" in found["named"])
-    assert by_a["loss"] == 0.0
-    ranked = gaitswarm(
-        "rank", finished.id, "--db", finished.db, "--json",
-        "--preference", str(first["preference"]).replace("'", '"'),
-    ).json["top"][0]  # fmt: skip
-    assert (ranked["iteration"], ranked["particle"]) == (first["iteration"], first["particle"])
-    own = gaitswarm("robustness", finished.id, "--db", finished.db, "--samples", 40, "--json").json
-    assert by_a["index"] == own["index"]
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("--drawn", "0"), "drawn: must be at least 1"),
-        (("--samples", "9"), "samples: 8 variables require at least 36"),
-        (("--precision", "half"), "precision"),
-    ],
-)
-def test_invalid_input_is_named(
-    gaitswarm: Gaitswarm, finished: Finished, options: tuple[str, str], said: str
-) -> None:
-    result = gaitswarm("preferences", finished.id, "--db", finished.db, *options)
-    assert result.code == 2
-    assert said in result.err
-
-
-def test_a_job_without_a_design_is_a_conflict(
-    gaitswarm: Gaitswarm, small_spec: Path, db: Path
-) -> None:
-    job = gaitswarm("submit", "--spec", small_spec, "--db", db, "--json").json
-    assert gaitswarm("preferences", job["id"], "--db", db).code == 4
+    submitted = gaitswarm("preferences", finished.id, "--search", "--db", finished.db, "--json")
+    assert submitted.code == 0, submitted.err
+    job = submitted.json
+    assert (job["kind"], job["state"]) == ("preferences", "queued")
+    best = gaitswarm("best", finished.id, "--db", finished.db, "--json").json["design"]
+    assert job["spec"]["tuning"]["start"][0] == best

@@ -20,6 +20,7 @@ from gaitswarm.sim.robot import load_robot
 from scripts.synthesize import Perturbation, synthetic_log
 from tests.calibration.conftest import WALKS
 from tests.certificate.examples import DOCUMENT as CERTIFICATE
+from tests.examples.preferences import DOCUMENT as PREFERENCES
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, UPHILL_WALK, logged_walk, short_walk
 
 pytestmark = pytest.mark.slow
@@ -61,6 +62,7 @@ OTHERS: dict[str, dict[str, Any]] = {
         "optimizer": {"particles": 4},
         "iterations": 2,
     },
+    "preferences": PREFERENCES,
 }
 
 
@@ -144,6 +146,5 @@ def test_every_analysis_answers_for_a_tuning(jobs: DatabaseJobs, tuned: JobView)
     assert jobs.ranking(tuned.id, "B").evaluations == tuned.evaluations
     assert jobs.importance(tuned.id).designs > 0
     assert jobs.front(tuned.id).size > 0
-    assert jobs.preferences(tuned.id, drawn=8).candidates
     assert jobs.preference_for(tuned.id, best.iteration, best.particle).fits
     assert len(jobs.comparison([tuned.id]).jobs) == 1

@@ -395,36 +395,6 @@ def test_a_fork_is_judged_by_its_own_constraints_without_simulation(store: Store
     assert isinstance(lifted.spec, JobSpec) and lifted.spec.constraints == ()
 
 
-OTHER_WEIGHTS: list[dict[str, Any]] = [
-    {"scenario_weights": {"slope-fast": 4.0}},
-    {"scenario_aggregate": "worst"},
-]
-
-
-@pytest.mark.parametrize("measure", OTHER_WEIGHTS)
-@pytest.mark.parametrize("before", [{}, *OTHER_WEIGHTS])
-def test_a_history_is_forked_and_ranked_with_other_weights_of_scenarios(
-    store: Store, measure: dict[str, Any], before: dict[str, Any]
-) -> None:
-    parent = run(store, spec(FAST, **before))
-    service = JobService(store)
-    columns = store.evaluation_columns(parent.id, 0, 6)
-    assert columns is not None
-    expected = spec(FAST, **measure).judge(columns.objectives, columns.failed).fitness
-
-    request = ForkRequest.model_validate({"from_iteration": 6, "iterations": 7, **measure})
-    fork, _ = service.fork(parent.id, request)
-    assert fork.lineage is not None and fork.lineage.carried == "search"
-    assert isinstance(fork.spec, JobSpec)
-    assert fork.spec.aggregation == spec(**measure).aggregation
-    assert store.job(fork.id).progress.best_fitness == expected.min()
-
-    top = DatabaseJobs(service, "").ranking(parent.id, **measure, top=1000).top
-    assert [design.fitness for design in top] == pytest.approx(
-        sorted(expected[np.isfinite(expected)].tolist())
-    )
-
-
 def test_statuses_count_as_failures_alone(store: Store) -> None:
     job = run(store, spec("reciprocal_speed<=0.01", iterations=1))
     columns = store.evaluation_columns(job.id, 0, 1)
@@ -471,8 +441,6 @@ def test_analyses_of_preferences_know_feasible_designs_alone(store: Store) -> No
     infeasible = set(
         zip(columns.iteration[slow].tolist(), columns.particle[slow].tolist(), strict=True)
     )
-    winners = jobs.preferences(job.id, drawn=20, candidates=20).candidates
-    assert not infeasible.intersection((w.iteration, w.particle) for w in winners)
     iteration, particle = min(infeasible)
     with pytest.raises(gaitswarm.Conflict, match="violates the job's constraints"):
         jobs.preference_for(job.id, iteration, particle)

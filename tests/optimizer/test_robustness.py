@@ -8,12 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.robustness import (
-    LocalSample,
-    Sensitivities,
-    local_sample,
-    sensitivities,
-)
+from gaitswarm.services.optimizer.analysis.robustness import Sensitivities, sensitivities
+from gaitswarm.services.optimizer.jobs.sensitivity import LocalSample, local_sample
 from gaitswarm.sim.variables import Variable
 
 X = Variable(name="x", low=0.0, high=10.0)

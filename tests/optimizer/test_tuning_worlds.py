@@ -11,10 +11,10 @@ import pytest
 from pydantic import ValidationError
 
 from gaitswarm.jobs.database import DatabaseJobs
-from gaitswarm.services.optimizer.analysis.certificate import conditional_value_at_risk
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.certificate import conditional_value_at_risk
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, log_utilities

@@ -22,8 +22,8 @@ from gaitswarm.services.optimizer.analysis.verdict import (
     percentage,
     relaxed,
 )
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.sim.outcome import RESULTS
 
 SCENARIOS = ("normal-fast", "slope-fast", "loaded-slow")

@@ -15,6 +15,7 @@ import pytest
 from gaitswarm.services.optimizer.analysis.verification import check_history
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.search.hype import HypeSettings
@@ -23,6 +24,7 @@ from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.forked import PROCESSES
 from tests.examples.jobs import history
+from tests.examples.preferences import small
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 from tests.resume import job_process
 
@@ -54,12 +56,12 @@ def url(database: Path) -> str:
     return f"sqlite:///{database}"
 
 
-def queue(store: Store, spec: JobSpec = SPEC) -> str:
+def queue(store: Store, spec: Spec = SPEC) -> str:
     job, _ = store.create_job(spec)
     return job.id
 
 
-def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
+def run_alone(store: Store, evaluator: Evaluator, spec: Spec = SPEC) -> str:
     job_id = queue(store, spec)
     assert run_embedded(store, evaluator, job_id).state is JobState.SUCCEEDED
     return job_id
@@ -164,6 +166,19 @@ def test_resumed_job_equals_one_never_killed(
     assert store.job(job_id).state is JobState.SUCCEEDED
     assert len(progress) >= 2 and progress[0] >= 1 and progress == sorted(progress)
     assert walked(store, job_id) == walked(store, whole)
+
+
+def test_a_killed_search_for_preferences_equals_one_never_killed(
+    store: Store, url: str, evaluator: Evaluator
+) -> None:
+    spec = small(iterations=6)
+    whole, killed = run_alone(store, evaluator, spec), queue(store, spec)
+    life = Life(url, killed)
+    life.wait_for_a_commit()
+    life.kill()
+    assert 1 <= store.job(killed).progress.iterations < store.job(whole).progress.iterations
+    assert run_embedded(store, evaluator, killed).state is JobState.SUCCEEDED
+    assert walked(store, killed) == walked(store, whole)
 
 
 @pytest.mark.thorough(

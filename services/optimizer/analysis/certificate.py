@@ -12,8 +12,11 @@ from pydantic import Field
 from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import mean_of_greatest
+from gaitswarm.services.optimizer.jobs.kinds.certificate import (
+    LEVEL,
+    CertificateSpec,
+    conditional_value_at_risk,
+)
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Judgement, Preference
 from gaitswarm.services.optimizer.views import (
     DesignValues,
@@ -33,7 +36,6 @@ Floats = NDArray[np.float64]
 
 QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-LEVEL: Final = 0.95
 """Level of the conditional value at risk and of all intervals."""
 
 MOST_WORST: Final = 1000
@@ -311,11 +313,6 @@ def proportion(happened: NDArray[np.bool_]) -> ProportionView:
     low = float(betaincinv(k, n - k + 1, tail)) if k > 0 else 0.0
     high = float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0
     return ProportionView(count=k, share=k / n, low=low, high=high)
-
-
-def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
-    """Mean of the worst of (n,) values (Rockafellar and Uryasev 2002), the greatest being worst."""
-    return mean_of_greatest(np.sort(values)[::-1].tolist(), max((1.0 - level) * len(values), 1.0))
 
 
 def _spread(values: Floats) -> SpreadView:

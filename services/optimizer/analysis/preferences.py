@@ -1,49 +1,36 @@
-"""Preferences: those under which a chosen design wins, and the one whose winner is most robust
+"""Preferences under which a chosen design wins
 
 For given biases the logarithm of fitness is linear in the exponents (eq. 4.1, 4.2), so the
-exponents under which a design has the greatest lead solve a linear program. A preference whose
-optimum is robust is proposed by the thesis as future research (4.5).
+exponents under which a design has the greatest lead solve a linear program.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from typing import Annotated, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.front import (
-    OwnFitness,
     TradeOffDesignView,
     design_fields,
 )
 from gaitswarm.services.optimizer.analysis.utilities import (
     NAMED,
-    NORMALISED_OBJECTIVES,
     PreferenceOwner,
     fitness_by,
     objective_vectors,
-    require_success,
-    tuning_spec,
 )
-from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import Preference
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, swarm_uniform
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import (
-    DesignValues,
     Finite,
-    IterationIndex,
-    Particle,
-    Request,
     View,
 )
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
@@ -52,7 +39,7 @@ Rows = NDArray[np.intp]
 _DRAWN: Final = 512
 """Sampled exponents for a design that cannot win."""
 
-_DRAW, _DRAW_PREFERENCE = 0xE4B0, 0xB1A5
+_DRAW: Final = 0xE4B0
 
 _AT_ONCE: Final = 4_000_000
 """Fitness values held in memory at a time."""
@@ -71,15 +58,6 @@ _LP: Final = 1e-10
 
 _TOLERANCE: Final = 1e-9
 """Tolerance of a lead relative to the linear program's, in the logarithm of fitness."""
-
-
-MOST: Final = 100_000
-"""Limit on the preferences and candidates of a request."""
-
-Drawn = Annotated[int, Field(description="Preferences drawn in addition to A, B and C.")]
-Radius = Annotated[
-    float, Field(description="Largest distance from it, as a share of the bounds [1].")
-]
 
 
 class PreferenceFitView(View):
@@ -260,169 +238,3 @@ def _best_rank(lead: Floats, exponent: Floats) -> Floats:
         ]
     )
     return np.asarray(candidates[better.argmin()])
-
-
-class IndexView(View):
-    """A robustness index with its interval; the smaller, the more robust."""
-
-    value: float = Field(description="The estimate [1].", examples=[1.42])
-    low: float = Field(description="Lower end of the interval of 95 % [1].", examples=[1.31])
-    high: float = Field(description="Upper end [1].", examples=[1.55])
-
-
-class PreferenceWinnerView(View):
-    """A design that is the best of its job under at least one preference."""
-
-    iteration: IterationIndex
-    particle: Particle
-    design: DesignValues
-    preference: Preference = Field(
-        description="One under which it wins: of table 4.5 if possible, else of the greatest lead."
-    )
-    named: list[str] = Field(description="Preferences of table 4.5 under which it wins.")
-    share: float = Field(description="Of the drawn preferences under which it wins [1].")
-    fitness: OwnFitness
-    loss: Finite = Field(
-        description="By how much that is worse than the job's best, as a share [1]."
-    )
-    index: IndexView | None = Field(
-        description="Robustness index over all scenarios; null if too many simulations failed."
-    )
-
-
-class RobustPreferencesView(View):
-    """Which preference's winner is the most robust, among the designs of one job."""
-
-    drawn: Drawn
-    winners: int = Field(description="Different designs that win under any.")
-    samples: int = Field(description="Designs simulated around each candidate.")
-    radius: Radius
-    seed: int = Field(description="Of preferences and samples.")
-    candidates: list[PreferenceWinnerView] = Field(
-        description="Winners of A, B and C, and of most other preferences; the most robust first."
-    )
-
-
-class PreferencesRequest(Request):
-    """Preferences to rank a job's designs by, and how to compare their winners."""
-
-    drawn: Drawn = Field(default=512, ge=1, le=MOST)
-    candidates: int = Field(
-        default=8,
-        ge=1,
-        le=MOST,
-        description="Winners to list: those of A, B and C, and of the others those that win under"
-        " most preferences.",
-    )
-    samples: int = Field(
-        default=0,
-        ge=0,
-        le=4096,
-        description="Designs to simulate around each of them, to estimate its robustness index;"
-        " 0 for no simulation and no index.",
-    )
-    radius: Radius = Field(default=0.02, gt=0.0, le=0.5)
-    seed: int = Field(default=1, ge=0, lt=2**63, description="Of preferences and samples.")
-    precision: Precision = Field(default="double", description="Of the physics.")
-
-
-Index = Callable[
-    [JobSpec, PreferencesRequest, list[dict[str, float | str]]], list[IndexView | None]
-]
-"""Estimates the robustness index of each of several designs of a job by simulation."""
-
-
-def robust_preferences(
-    job_id: str,
-    spec: AnySpec,
-    columns: EvaluationColumns,
-    request: PreferencesRequest,
-    index: Index,
-) -> RobustPreferencesView:
-    """Rank a job's designs under many preferences and compare the winners."""
-    spec = tuning_spec(job_id, spec, "a preference")
-    require_success(job_id, columns.fitness[:, np.newaxis])
-    drawn = drawn_preferences(columns, count=request.drawn, seed=request.seed)
-    winners = preference_winners(columns, drawn, aggregation=spec.aggregation)
-    chosen = winners[: max(request.candidates, sum(bool(winner.named) for winner in winners))]
-    space, best = spec.design_space(), float(columns.fitness.min())
-    designs = [space.shown(columns.designs[winner.row].tolist()) for winner in chosen]
-    indices = index(spec, request, designs) if request.samples else [None] * len(designs)
-    candidates = [
-        PreferenceWinnerView(
-            iteration=int(columns.iteration[winner.row]),
-            particle=int(columns.particle[winner.row]),
-            design=design,
-            preference=winner.preference,
-            named=list(winner.named),
-            share=winner.share,
-            fitness=(fitness := float(columns.fitness[winner.row])),
-            loss=fitness / best - 1.0,
-            index=estimate,
-        )
-        for winner, design, estimate in zip(chosen, designs, indices, strict=True)
-    ]
-    return RobustPreferencesView(
-        drawn=request.drawn,
-        winners=len(winners),
-        samples=request.samples,
-        radius=request.radius,
-        seed=request.seed,
-        candidates=sorted(candidates, key=lambda c: math.inf if c.index is None else c.index.value),
-    )
-
-
-def drawn_preferences(columns: EvaluationColumns, *, count: int, seed: int) -> list[Preference]:
-    """Draw preferences of five objectives.
-
-    Exponents are uniform in 0 to 1, as in table 4.5; only their ratios affect a ranking. Biases are
-    uniform between 0 and the median of their objective in the job: a bias as large as its objective
-    halves the effect of a relative change.
-    """
-    size = len(NORMALISED_OBJECTIVES)
-    values = columns.objectives[columns.statuses == 0][:, :size]
-    scale = np.median(values[np.isfinite(values).all(axis=1)], axis=0)
-    numbers = swarm_uniform(seed, _DRAW_PREFERENCE, iteration=0, particles=count, count=2 * size)
-    return [
-        Preference(
-            bias=tuple((row[:size] * np.abs(scale)).tolist()),
-            exponent=tuple((1.0 - row[size:]).tolist()),
-        )
-        for row in numbers
-    ]
-
-
-class Winner(NamedTuple):
-    """The best row under some preferences; see `PreferenceWinnerView`."""
-
-    row: int
-    preference: Preference
-    named: tuple[str, ...]
-    share: float
-
-
-def preference_winners(
-    columns: EvaluationColumns,
-    drawn: Sequence[Preference],
-    *,
-    aggregation: Aggregation | None = None,
-) -> list[Winner]:
-    """Return the winners under any of the preferences."""
-    preferences = [*NAMED.values(), *drawn]
-    names = [*NAMED, *("" for _ in drawn)]
-    best = np.array([fitness_by(columns, p, aggregation=aggregation).argmin() for p in preferences])
-    rows = np.unique(best)
-    # Lead of each winner over the others, under every preference.
-    winning = columns.rows(rows)
-    rivals = np.sort(
-        [np.log(fitness_by(winning, p, aggregation=aggregation)) for p in preferences], axis=1
-    )
-    lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
-    winners = []
-    for row in rows.tolist():
-        won = np.flatnonzero(best == row)
-        named = tuple(names[index] for index in won if names[index])
-        chosen = won[0] if named else won[lead[won].argmax()]
-        share = np.count_nonzero(won >= len(NAMED)) / max(1, len(drawn))
-        winners.append(Winner(row, preferences[chosen], named, share))
-    return sorted(winners, key=lambda winner: (not winner.named, -winner.share, winner.row))

@@ -15,7 +15,6 @@ from gaitswarm.services.optimizer.analysis.utilities import fitness_by, infeasib
 from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, evaluations_of
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate, ScenarioWeights
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View
 
@@ -36,12 +35,6 @@ class RankingRequest(Request):
         description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
         " list: none.",
         examples=[["speed>=0.05"]],
-    )
-    scenario_weights: ScenarioWeights | None = Field(
-        default=None, description="As in a spec; null: those of the job."
-    )
-    scenario_aggregate: ScenarioAggregate | None = Field(
-        default=None, description="As in a spec; null: that of the job."
     )
     top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
 
@@ -95,8 +88,7 @@ def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
     walked = np.isfinite(fitness)
     fitness[infeasible_rows(columns, spec)] = np.inf
     present = _best_first(before)
-    ranks = np.zeros(len(columns), dtype=np.int64)
-    ranks[present] = np.arange(1, len(present) + 1)
+    ranks = {row: rank for rank, row in enumerate(present.tolist(), start=1)}
     rows = _best_first(fitness)[:top]
     views = evaluation_views(evaluations_of(replace(columns, fitness=fitness).rows(rows)), spec)
     starts = iteration_starts(columns)
@@ -104,27 +96,26 @@ def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
     best_so_far = np.minimum.accumulate(least).tolist()
     both = np.isfinite(fitness) & np.isfinite(before)
     correlation = spearman(fitness[both], before[both]) if both.any() else None
-    # One validation for all: a call for each iteration would dominate.
-    return RankingView.model_validate(
-        {
-            "preference": spec.preference,
-            "evaluations": len(columns),
-            "infeasible": int(np.count_nonzero(walked & np.isinf(fitness))),
-            "fitness_of_present_best": float(fitness[present[0]]) if len(present) else None,
-            "correlation": correlation,
-            "top": [
+    return RankingView(
+        preference=spec.preference,
+        evaluations=len(columns),
+        infeasible=int(np.count_nonzero(walked & np.isinf(fitness))),
+        fitness_of_present_best=float(fitness[present[0]]) if len(present) else None,
+        correlation=correlation,
+        top=[
+            RankedDesignView.model_validate(
                 {
                     **dict(view),
                     "rank": place,
-                    "rank_before": int(ranks[row]) or None,
+                    "rank_before": ranks.get(row),
                     "fitness_before": before[row],
                 }
-                for place, (row, view) in enumerate(zip(rows.tolist(), views, strict=True), start=1)
-            ],
-            "best_so_far": [
-                {"index": index, "fitness": value} for index, value in enumerate(best_so_far)
-            ],
-        }
+            )
+            for place, (row, view) in enumerate(zip(rows.tolist(), views, strict=True), start=1)
+        ],
+        best_so_far=[
+            BestSoFarView(index=index, fitness=value) for index, value in enumerate(best_so_far)
+        ],
     )
 
 

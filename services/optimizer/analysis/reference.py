@@ -26,16 +26,17 @@ from gaitswarm.services.optimizer.jobs.constraints import (
 from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.preference import by_design
-from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
-from gaitswarm.services.optimizer.jobs.reference import (
+from gaitswarm.services.optimizer.jobs.kinds.reference import (
     GIVEN,
     Reference,
     ReferenceKind,
     adapted_to_job,
+    nearest_design,
     reference_design,
 )
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import by_design
+from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.case import run_together
@@ -159,7 +160,7 @@ def with_references(
             if constraint.relative_to is not None:
                 controller, design = _referred(spec, constraint.relative_to, job_of, best_of)
                 values = _values(spec, constraint, controller, design)
-                nearest = _nearest(spec, design) if controller == spec.controller else None
+                nearest = nearest_design(spec, design) if controller == spec.controller else None
                 start += [nearest] if starts and nearest and nearest not in start else []
         except (GaitswarmError, SimulationError, ValueError) as error:
             message = str(error).removeprefix("relative_to: ")
@@ -225,21 +226,6 @@ def _referred(
     space = other.design_space()
     (values,) = space.simulated(best.design[np.newaxis]).tolist()
     return other.controller, dict(zip(space.names, values, strict=True))
-
-
-def _nearest(spec: JobSpec, design: Mapping[str, float]) -> dict[str, float | str] | None:
-    """Return the design of a job that is nearest to a reference; None if there is none.
-
-    A gait that the reference leaves to the scenario is that of the first one.
-    """
-    gait, nearest = spec.resolved_scenarios()[0].model_dump(), dict[str, float | str]()
-    for variable in spec.design_space().variables:
-        value = design.get(variable.name, gait.get(variable.name))
-        if value is None:
-            return None
-        number = min(max(variable.number(value), variable.low), variable.high)
-        nearest[variable.name] = variable.shown(number)
-    return nearest
 
 
 def _complete_design(spec: JobSpec, design: Mapping[str, float | str]) -> dict[str, float]:

@@ -8,8 +8,7 @@ Jacobian is that of a linear regression over a sample of designs around the give
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated, Final, TypeVar
 
 import numpy as np
@@ -17,11 +16,16 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
-from gaitswarm.services.optimizer.analysis.preferences import IndexView
 from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, resample_weights
 from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.designs import WalksRequest
+from gaitswarm.services.optimizer.jobs.sensitivity import (
+    LocalSample,
+    local_sample,
+    slopes_and_squares,
+    usable_rows,
+)
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
@@ -36,7 +40,7 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _RESAMPLES: Final = 400
-_SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
+_RESAMPLE = 0xB0075
 
 
 class RobustnessRequest(WalksRequest):
@@ -88,16 +92,12 @@ class RobustnessRequest(WalksRequest):
             yield catalogue[name] if isinstance(entry, str) else entry
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LocalSample:
-    """Designs uniform in a box around a design, within the variables' bounds."""
+class IndexView(View):
+    """A robustness index with its interval; the smaller, the more robust."""
 
-    varied: tuple[Variable, ...]  # d
-    held: tuple[str, ...]  # categorical ones, and integers whose neighbors are outside the box
-    names: tuple[str, ...]  # v columns of the designs
-    designs: Floats  # (1 + n, v), the center first
-    shift: Floats  # (1 + n, d) from the center, as a share of each variable's bounds
-    radius: float  # half the box's width, as a share of the bounds
+    value: float = Field(description="The estimate [1].", examples=[1.42])
+    low: float = Field(description="Lower end of the interval of 95 % [1].", examples=[1.31])
+    high: float = Field(description="Upper end [1].", examples=[1.55])
 
 
 ByVariable = Annotated[dict[str, Finite], Field(examples=[{"FI1R": 0.7, "FOR": 0.8}])]
@@ -188,64 +188,6 @@ def robustness_view(
     )
 
 
-def least_samples(varied: int) -> int:
-    """Return the minimum sample size."""
-    return 4 * (varied + 1)
-
-
-def local_sample(
-    design: Mapping[str, float],
-    variables: Sequence[Variable],
-    *,
-    radius: float,
-    samples: int,
-    seed: int,
-) -> LocalSample:
-    """Sample designs around one.
-
-    Values are within `radius` times the width of the bounds on either side, and within the bounds.
-    A design outside its bounds is sampled on the side towards them. Larger samples extend smaller
-    ones.
-    """
-    varied = tuple(v for v in variables if _reaches_neighbours(v, radius))
-    if not varied:
-        raise InvalidRequest(
-            "none of them can vary; choose others or a greater radius", field="variables"
-        )
-    least = least_samples(len(varied))
-    if samples < least:
-        raise InvalidRequest(f"{len(varied)} variables require at least {least}", field="samples")
-    names = tuple(design)
-    designs = np.tile(np.array(list(design.values()), dtype=np.float64), (1 + samples, 1))
-    shift = np.zeros((1 + samples, len(varied)))
-    numbers = swarm_uniform(seed, _SAMPLE, iteration=0, particles=samples, count=len(varied))
-    for j, variable in enumerate(varied):
-        center, width = design[variable.name], variable.high - variable.low
-        values = _around(center, variable, radius, numbers[:, j])
-        designs[1:, names.index(variable.name)] = values
-        shift[1:, j] = (values - center) / width
-    moving = {variable.name for variable in varied}
-    held = tuple(v.name for v in variables if v.name not in moving)
-    return LocalSample(varied, held, names, designs, shift, radius)
-
-
-def _reaches_neighbours(variable: Variable, radius: float) -> bool:
-    if variable.kind == "integer":
-        return radius * (variable.high - variable.low) >= 1.0
-    return variable.kind == "continuous"
-
-
-def _around(center: float, variable: Variable, radius: float, numbers: Floats) -> Floats:
-    """Map numbers (n,) in [0, 1) to values of a variable."""
-    reach = radius * (variable.high - variable.low)
-    low = max(center - reach, min(variable.low, center))
-    high = min(center + reach, max(variable.high, center))
-    if variable.kind == "integer":
-        first, last = math.ceil(low), math.floor(high)
-        return np.asarray(first + np.floor(numbers * (last - first + 1)))
-    return np.asarray(low + numbers * (high - low))
-
-
 def sensitivities(
     sample: LocalSample,
     objectives: Floats,
@@ -259,7 +201,7 @@ def sensitivities(
     designs, the same for all scenarios.
     """
     values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
-    usable = ~failed & (np.isfinite(values) & (values > 0.0)).all(axis=2)
+    usable = usable_rows(values, failed)
     count = len(sample.designs)
     draws = swarm_uniform(0, _RESAMPLE, iteration=0, particles=_RESAMPLES, count=count)
     weights = resample_weights(draws)
@@ -268,17 +210,7 @@ def sensitivities(
     biased, unbiased, rows, columns = [], [], [], []
     for k, name in enumerate(scenarios):
         chosen = usable[:, k]
-        slopes = squares = np.full((len(weights), len(variables), values.shape[2]), np.nan)
-        if chosen.sum() >= least_samples(len(variables)):
-            shift = sample.shift[chosen] / sample.radius
-            logarithms = np.log(values[chosen, k])
-            slopes, variances = _regressions(
-                np.hstack([np.ones((len(shift), 1)), shift]),
-                logarithms - logarithms.mean(axis=0),
-                weights[:, chosen],
-            )
-            slopes = slopes / sample.radius
-            squares = slopes**2 - variances / sample.radius**2
+        slopes, squares = slopes_and_squares(sample, values[:, k], chosen, weights)
         biased.append(float((slopes[0] ** 2).sum()))
         unbiased.append(squares.sum(axis=(1, 2)))
         rows.append(np.sqrt(np.maximum(squares[0].sum(axis=0), 0.0)))
@@ -318,21 +250,3 @@ def _interval(biased: float, unbiased: Floats) -> IndexView | None:
 
 def _named(names: Iterable[str], values: Iterable[T]) -> dict[str, T]:
     return dict(zip(names, values, strict=True))
-
-
-def _regressions(x: Floats, y: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Slopes (1 + B, d, M) by least squares with each row of weights, and their variances.
-
-    x: (n, 1 + d) with a column of ones; y: (n, M).
-    """
-    n, p = x.shape
-    gram = (weights @ (x[:, :, None] * x[:, None, :]).reshape(n, -1)).reshape(-1, p, p)
-    moments = (weights @ (x[:, :, None] * y[:, None, :]).reshape(n, -1)).reshape(len(gram), p, -1)
-    # A resample may have too few values of an integer variable.
-    inverse = np.linalg.pinv(gram, hermitian=True)
-    coefficients = inverse @ moments
-    squares = weights @ y**2 - (coefficients * moments).sum(axis=1)
-    freedom = np.maximum(weights.sum(axis=1) - p, 1.0)
-    residual_variance = np.maximum(squares, 0.0) / freedom[:, None]
-    diagonal = np.diagonal(inverse, axis1=1, axis2=2)[:, 1:]
-    return coefficients[:, 1:], diagonal[:, :, None] * residual_variance[:, None, :]

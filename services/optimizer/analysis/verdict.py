@@ -20,8 +20,8 @@ from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS
 

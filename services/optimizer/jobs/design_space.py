@@ -66,8 +66,8 @@ class DesignSpace:
         missing = [variable.name for variable in required if variable.name not in covered]
         if missing:
             raise ValueError(
-                f"variables: {', '.join(missing)} neither searched nor fixed; give every variable"
-                " of the controller"
+                f"variables: {', '.join(missing)} neither searched nor fixed; search or"
+                " fix every one"
             )
         if not variables:
             raise ValueError("variables: every variable is fixed; leave at least one to search")

@@ -11,6 +11,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.input import message_of
 
@@ -25,17 +26,19 @@ AnySpec = Annotated[
     Annotated[JobSpec, Tag("<tuning>")]
     | Annotated[IdentificationSpec, Tag("<identification>")]
     | Annotated[CalibrationSpec, Tag("<calibration>")]
-    | Annotated[CertificateSpec, Tag("<certificate>")],
+    | Annotated[CertificateSpec, Tag("<certificate>")]
+    | Annotated[PreferencesSpec, Tag("<preferences>")],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",
-        custom_error_message="kind: must be tuning, identification, calibration or certificate",
+        custom_error_message="kind: must be tuning, identification, calibration, certificate or"
+        " preferences",
     ),
 ]
 
-SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec]] = (
-    TypeAdapter(AnySpec)
-)
+SPECS: Final[
+    TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec | PreferencesSpec]
+] = TypeAdapter(AnySpec)
 """Validates a spec of any kind; raises ValidationError."""
 
 

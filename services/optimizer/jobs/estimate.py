@@ -18,6 +18,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
@@ -123,7 +124,9 @@ class Estimate:
 
 def estimate(spec: Spec, cases: Sequence[Case], measured: MeasuredRates) -> Estimate:
     """Estimate a job from the rate of a short simulation in this thread."""
-    rate, basis = measured.rate(spec, cases, spec.create_search().ask())
+    walked = spec.tuning if isinstance(spec, PreferencesSpec) else spec
+    walks = walked.cases({}) if walked is not spec else cases
+    rate, basis = measured.rate(walked, walks, walked.create_search().ask())
     simulated = spec.budget * duration(spec, cases)
     return Estimate(
         evaluations=spec.budget,

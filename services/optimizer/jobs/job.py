@@ -12,13 +12,13 @@ from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, QuotaE
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask, JournalEntry
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import (
     JobProvenance,
     ProvenanceRecords,
     changes_since,
 )
-from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.sim.identification import Recordings
 
 DEFAULT_PRIORITY: Final = 0

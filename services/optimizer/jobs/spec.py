@@ -5,7 +5,8 @@ Spec
 │   ├── JobSpec          (kind `tuning`) tunes a controller
 │   └── CertificateSpec  (kind `certificate`) simulates a design in many perturbed models
 ├── IdentificationSpec   (kind `identification`) fits robot parameters to measured walks
-└── CalibrationSpec      (kind `calibration`) fits robot and conventions to tables of results
+├── CalibrationSpec      (kind `calibration`) fits robot and conventions to tables of results
+└── PreferencesSpec      (kind `preferences`) judges preferences by the optima of a tuning job
 """
 
 from __future__ import annotations

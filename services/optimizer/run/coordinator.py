@@ -52,6 +52,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     Reevaluation,
 )
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, refusal
+from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.preference import by_design
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.jobs.spec import Spec, judge_outcomes
@@ -188,7 +189,7 @@ KEY_BYTES: Final = 16
 
 
 def walk_keys(
-    spec: Spec, provenance: Provenance, simulated: NDArray[np.float64]
+    spec: Spec, provenance: Provenance | JobProvenance, simulated: NDArray[np.float64]
 ) -> tuple[bytes, ...]:
     """Return the cache keys of designs' outcomes in all cases of a job.
 
@@ -326,7 +327,9 @@ def _evaluate(state: Coordination) -> Decision:
         provenance=provenance.simulation.model_copy(update={"precision": spec.precision}),
         iteration=ask.iteration,
     )
-    keys = walk_keys(spec, request.provenance, request.designs)
+    # The optimum of a preference depends on the code of searches, too.
+    determinants = provenance if isinstance(spec, PreferencesSpec) else request.provenance
+    keys = walk_keys(spec, determinants, request.designs)
     return replace(state, phase=phase), (Evaluate(request, keys),)
 
 

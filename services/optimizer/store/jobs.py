@@ -36,6 +36,7 @@ from gaitswarm.services.optimizer.jobs.job import (
     commanded,
     extended,
 )
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.labels import (
     ANY_JOB,
     OWN,
@@ -56,7 +57,6 @@ from gaitswarm.services.optimizer.jobs.listing import (
     to_cursor,
 )
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
-from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import take_history

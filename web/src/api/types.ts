@@ -42,7 +42,15 @@ export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
 export type CalibrationSpec = Schemas['CalibrationSpec']
 export type CertificateSpec = Schemas['CertificateSpec']
-export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec
+export type PreferencesSpec = Schemas['PreferencesSpec']
+export type AnySpec =
+  | JobSpec
+  | IdentificationSpec
+  | CalibrationSpec
+  | CertificateSpec
+  | PreferencesSpec
+export type CandidatePreferences = Schemas['CandidatePreferencesView']
+export type CandidatePreference = Schemas['CandidatePreferenceView']
 export type Certificate = Schemas['CertificateView']
 export type ComparedEngine = Schemas['ComparedEngineView']
 export type Compared = Schemas['ComparedView']
@@ -68,8 +76,6 @@ export type FrontDesign = Schemas['FrontDesignView']
 export type FrontWinner = Schemas['FrontWinnerView']
 export type PreferenceFor = Schemas['PreferenceForView']
 export type PreferenceFit = Schemas['PreferenceFitView']
-export type RobustPreferences = Schemas['RobustPreferencesView']
-export type PreferenceWinner = Schemas['PreferenceWinnerView']
 export type Importance = Schemas['ImportanceView']
 export type VariableImportance = Schemas['VariableImportanceView']
 export type ImportanceIndex = Schemas['IndexIntervalView']

@@ -46,6 +46,7 @@ const SEARCHES = ['tuning', 'identification', 'calibration'] as const
 const PARTS: Readonly<Record<string, Part>> = {
   '': { label: 'Overview', kinds: [], Panel: OverviewPanel },
   certificate: part('Certificate', () => import('./certificate/panel'), 'certificate'),
+  candidates: part('Preferences', () => import('./candidates/panel'), 'preferences'),
   targets: part('Targets', () => import('./targets/panel'), 'calibration'),
   scenarios: part('Scenarios', () => import('./scenarios/panel'), ...SEARCHES),
   parameters: part(

@@ -87,7 +87,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
     loadCatalogue(signal),
     id === null ? null : readableJob(id, signal),
   ])
-  const from = cloned && withSeed(cloned, query.get('seed'))
+  const from = cloned && withSeed(tuningOf(cloned, query), query.get('seed'))
   if (!from || isDocument(from, catalogue)) {
     return { catalogue, draft: startingFrom(blank(catalogue, query), query), from }
   }
@@ -115,6 +115,12 @@ function startingFrom(draft: Draft, query: URLSearchParams): Draft {
 function isDocument({ spec }: Job, { cases }: Catalogue): boolean {
   if (spec.kind !== 'tuning') return true
   return (spec.case ?? null) !== null && caseOf(spec.case, cases) === null
+}
+
+/** With a preference to tune by, a search for preferences is replaced by the job that it tunes. */
+function tuningOf(job: Job, query: URLSearchParams): Job {
+  if (job.spec.kind !== 'preferences' || !query.has('preference')) return job
+  return { ...job, spec: job.spec.tuning as JobSpec }
 }
 
 function withSeed(job: Job, seed: string | null): Job {

@@ -14,6 +14,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_vali
 from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import mean_of_greatest
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
@@ -189,6 +190,15 @@ class Enumeration(Stateful[CountedState]):
 
     def _answer(self, fitness: Floats) -> None:
         self.state.evaluations += len(fitness)
+
+
+LEVEL: Final = 0.95
+"""Of intervals and conditional values at risk."""
+
+
+def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
+    """Mean of the worst of (n,) values (Rockafellar and Uryasev 2002), the greatest being worst."""
+    return mean_of_greatest(np.sort(values)[::-1].tolist(), max((1.0 - level) * len(values), 1.0))
 
 
 BATCH: Final = 50

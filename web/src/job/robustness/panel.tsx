@@ -1,39 +1,20 @@
-/** Sensitivity of the winner to small changes of its variables, and of the winners of preferences. */
+/** Sensitivity of the winner to small changes of its variables. */
 
-import { useState } from 'preact/hooks'
 import { post } from '../../api/client'
 import { cached, useResource } from '../../api/resource'
-import type {
-  Job,
-  JobSpec,
-  PreferenceWinner,
-  Robustness,
-  RobustnessIndex,
-  RobustPreferences,
-} from '../../api/types'
+import type { Job, JobSpec, Robustness, RobustnessIndex } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Card, EmptyCard, Loaded } from '../../components/card'
-import { ErrorNotice, Loading } from '../../components/feedback'
 import { type Column, Table } from '../../components/table/table'
-import { formatCount, formatExact, formatNumber, NONE, percent } from '../../format/number'
+import { formatNumber, NONE, percent } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
-import { jobPath, withQuery } from '../../router/routes'
 import { Bars } from '../bars'
-import { DesignLink } from '../columns'
+import { SearchButton } from '../candidates/search-button'
 import { searchedVariables } from '../facts'
-import { preferenceQuery } from '../preference'
 
-/** Fewest designs simulated around the job's winner, and around the winner of a preference. */
+/** Fewest designs simulated around the winner. */
 const LEAST_SAMPLES = 128
-const LEAST_SAMPLES_EACH = 48
-
-/** Number of winners compared; servers limit the length of simulations. */
-const CANDIDATES = 5
-
-function samplesOf(job: Job, least: number): number {
-  return Math.max(least, 4 * (searchedVariables(job.spec).length + 1))
-}
 
 export default function RobustnessPanel({ job }: { job: Job }) {
   const { best } = job
@@ -60,7 +41,12 @@ export default function RobustnessPanel({ job }: { job: Job }) {
           </>
         )}
       </Loaded>
-      <PreferencesCard job={job} />
+      <Card title="A preference for robustness" tools={<SearchButton job={job} />}>
+        <p class="muted">
+          A search for preferences finds the design that is optimal under each, and judges it by its
+          robustness and its evenness over the scenarios. It takes some minutes.
+        </p>
+      </Card>
     </div>
   )
 }
@@ -74,7 +60,7 @@ function estimate(job: Job): Promise<Robustness> {
       scenarios,
       design: { ...job.best!.design },
       variables: [...searchedVariables(job.spec)],
-      samples: samplesOf(job, LEAST_SAMPLES),
+      samples: Math.max(LEAST_SAMPLES, 4 * (searchedVariables(job.spec).length + 1)),
       radius: 0.02,
       seed: 1,
       precision: 'double',
@@ -183,133 +169,4 @@ function ByVariable({
       />
     </ChartCard>
   )
-}
-
-/** Comparison of preferences by the robustness of their winners: A, B, C and random ones. */
-function PreferencesCard({ job }: { job: Job }) {
-  const [simulated, setSimulated] = useState(false)
-  const key = `${job.id} ${job.evaluations} ${simulated}`
-  const preferences = useResource(
-    key,
-    () =>
-      cached(key, () =>
-        post('/v1/jobs/{job_id}/preferences', {
-          path: { job_id: job.id },
-          body: {
-            drawn: 512,
-            candidates: CANDIDATES,
-            samples: simulated ? samplesOf(job, LEAST_SAMPLES_EACH) : 0,
-            radius: 0.02,
-            seed: 1,
-            precision: 'single',
-          },
-        }),
-      ),
-    { keep: true },
-  )
-  const { data, error, loading, reload } = preferences
-  const [first] = data?.candidates ?? []
-  return (
-    <Card
-      title="Robustness by preference"
-      data={{ 'data-most-robust': data && data.samples > 0 && first ? placeWord(first) : '' }}
-      tools={
-        !simulated && (
-          <button type="button" class="compact" onClick={() => setSimulated(true)}>
-            Simulate designs around the winners
-          </button>
-        )
-      }
-    >
-      <div class="stack">
-        {error && (
-          <ErrorNotice what="Could not compare the preferences." error={error} retry={reload} />
-        )}
-        {loading && <Loading what={simulated ? 'simulations around the winners' : 'the winners'} />}
-        {data && <Winners job={job} preferences={data} />}
-      </div>
-    </Card>
-  )
-}
-
-function Winners({ job, preferences }: { job: Job; preferences: RobustPreferences }) {
-  const { candidates, drawn, winners, samples } = preferences
-  const [first] = candidates
-  return (
-    <>
-      {first?.index && (
-        <p>
-          The most robust winner is <DesignLink job={job} {...first} />, best under{' '}
-          {[...first.named, `${percent(first.share, 2)} of the random preferences`]
-            .join(', ')
-            .replace(/, (?=[^,]*$)/, ' and ')}
-          . Its robustness index is {formatNumber(first.index.value, 3)}; lower is more robust.
-        </p>
-      )}
-      <Table
-        caption="Winners under A, B, C and random preferences"
-        rows={candidates}
-        rowData={({ named }) => ({ 'data-wins-under': named.join(' ') })}
-        columns={winnerColumns(job, samples > 0)}
-      />
-      <p class="muted small">
-        All designs ranked under A, B, C and {formatCount(drawn)} random preferences:{' '}
-        {formatCount(winners)} of them win under at least one.{' '}
-        {samples > 0 &&
-          `The index is estimated from ${formatCount(samples)} designs around each, with a 95 % interval. `}
-        Only evaluated designs can win; to search under a preference, run another job.
-      </p>
-    </>
-  )
-}
-
-function winnerColumns(job: Job, simulated: boolean): readonly Column<PreferenceWinner>[] {
-  const index: Column<PreferenceWinner> = {
-    key: 'robustness index',
-    numeric: true,
-    value: ({ index }) => index?.value ?? null,
-    cell: ({ index }) =>
-      index ? (
-        <>
-          {formatNumber(index.value, 3)}{' '}
-          <span class="muted small">
-            ({formatNumber(index.low, 3)}–{formatNumber(index.high, 3)})
-          </span>
-        </>
-      ) : (
-        NONE
-      ),
-  }
-  return [
-    {
-      key: 'best under',
-      header: true,
-      value: ({ named }) => named.join(', ') || null,
-      cell: ({ named }) => named.join(', ') || 'random ones only',
-    },
-    { key: 'share of random', percent: 2, minor: true, value: ({ share }) => share },
-    { key: 'design', cell: (winner) => <DesignLink job={job} {...winner} /> },
-    ...(simulated ? [index] : []),
-    { key: 'fitness (job’s preference)', digits: 4, value: ({ fitness }) => fitness },
-    {
-      key: 'loss',
-      unit: '%',
-      numeric: true,
-      value: ({ loss }) => loss,
-      cell: ({ loss }) => formatExact(loss && loss * 100, 2),
-    },
-    {
-      key: 'preference',
-      cell: ({ preference }) => (
-        <a
-          class="nowrap"
-          href={withQuery(jobPath(job.id, 'preferences'), {
-            preference: preferenceQuery(preference),
-          })}
-        >
-          rank by it
-        </a>
-      ),
-    },
-  ]
 }

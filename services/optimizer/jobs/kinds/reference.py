@@ -98,3 +98,18 @@ def adapted_to_job(published: Mapping[str, float], spec: JobSpec) -> dict[str, f
         if name not in GAIT_CATALOGUE or name in searched
     }
     return published_values | held
+
+
+def nearest_design(spec: JobSpec, design: Mapping[str, float]) -> dict[str, float | str] | None:
+    """Return the design of a job that is nearest to a reference; None if there is none.
+
+    A gait that the reference leaves to the scenario is that of the first one.
+    """
+    gait, nearest = spec.resolved_scenarios()[0].model_dump(), dict[str, float | str]()
+    for variable in spec.design_space().variables:
+        value = design.get(variable.name, gait.get(variable.name))
+        if value is None:
+            return None
+        number = min(max(variable.number(value), variable.low), variable.high)
+        nearest[variable.name] = variable.shown(number)
+    return nearest

@@ -108,6 +108,9 @@ def build_spec(options: SpecOptions) -> AnySpec:
     fields = {name: value for name, value in options.given.items() if name != "spec"}
     if options.scenarios is not None:
         fields["scenarios"] = scenario_data(options.scenarios, options.robot)
+    if (terrain := fields.pop("terrain", None)) is not None:
+        chosen = fields.get("scenarios") or data.get("scenarios")
+        fields["scenarios"] = on_terrain(chosen or scenario_data("all", options.robot), terrain)
     if options.robot is not None:
         fields["robot"] = _robot(options.robot)
     case = options.case
@@ -268,6 +271,51 @@ def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, A
         or (read_json_object(Path(entry), "scenario") if entry.endswith(".json") else entry)
         for entry in entries
     ]
+
+
+def on_terrain(
+    entries: Sequence[str | Mapping[str, Any] | Scenario], text: str
+) -> list[dict[str, Any]]:
+    """Return scenarios on another terrain.
+
+    text: of --terrain.
+    """
+    from gaitswarm.sim.scenario import Scenario, find_scenario
+
+    terrain = _terrain(text)
+    scenarios = []
+    for entry in entries:
+        full = entry if isinstance(entry, Mapping | Scenario) else find_scenario(entry)
+        document = full.model_dump(mode="json") if isinstance(full, Scenario) else dict(full)
+        scenarios.append(document | {"terrain": terrain})
+    return scenarios
+
+
+_NUMBERS: Final = {
+    "plane": (),
+    "rough": ("amplitude", "correlation_length", "seed"),
+    "steps": ("height", "depth", "start"),
+    "stairs": ("height", "depth", "start"),
+}
+"""Fields of a kind of terrain that follow it in --terrain."""
+
+
+def _terrain(text: str) -> dict[str, Any]:
+    if text.lstrip().startswith("{") or text.endswith(".json"):
+        return json_object(text, "terrain")
+    kind, *parts = text.split(":")
+    if kind == "grid" and len(parts) == 2:
+        from gaitswarm.robots import read_text
+
+        lines = read_text(Path(parts[0]), field="terrain", most=LARGEST_FILE).split()
+        return {"kind": kind, "cell": parts[1], "heights": [line.split(",") for line in lines]}
+    if len(parts) > len(_NUMBERS.get(kind, ())):
+        raise InvalidRequest(
+            f"{text!r} is not rough:AMPLITUDE[:CORRELATION_LENGTH[:SEED]], steps or"
+            " stairs:HEIGHT[:DEPTH[:START]], grid:FILE.csv:CELL, plane or FILE.json",
+            field="terrain",
+        )
+    return {"kind": kind} | dict(zip(_NUMBERS.get(kind, ()), parts, strict=False))
 
 
 def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...]:

@@ -225,6 +225,16 @@ Precision = Annotated[
 ]
 
 
+TerrainOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="KIND:NUMBERS|JSON|FILE",
+        help="Walk the scenarios on uneven ground: rough:0.01 (amplitude in m), stairs:0.02 or"
+        " steps:0.02 (height in m), grid:FILE.csv:0.01 (rows of heights and their distance in m).",
+    ),
+]
+
+
 @dataclass(frozen=True, slots=True)
 class GivenOptions:
     """Options of which None says that the user did not pass them."""
@@ -285,6 +295,7 @@ class SpecOptions(GivenOptions):
     scenarios: Annotated[
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
     ] = None
+    terrain: TerrainOption = None
     controller: ControllerOption = None
     case: Annotated[
         str | None,

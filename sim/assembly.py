@@ -38,7 +38,9 @@ from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.robot.shapes import body_corners
 from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.terrain import height_grid
 
 Backend = Literal["auto", "native", "reference"]
 """`native` is the compiled kernel, `reference` the CasADi interpreter, `auto` either."""
@@ -63,13 +65,17 @@ SHORTEST_WALK: Final = 1e-3
 
 
 def kernel_of(
-    robot: Robot, backend: Backend = "auto", *, precision: Precision = "double"
+    robot: Robot,
+    backend: Backend = "auto",
+    *,
+    precision: Precision = "double",
+    uneven: bool = False,
 ) -> Kernel:
     if backend == "reference" and precision != "double":
         raise SimulationInputError(
             f"precision: the reference kernel supports double only, not {precision}"
         )
-    native = None if backend == "reference" else native_kernel(robot, precision)
+    native = None if backend == "reference" else native_kernel(robot, precision, uneven=uneven)
     if native is not None:
         return native
     if backend == "native":
@@ -84,7 +90,7 @@ def kernel_of(
     # The native kernel does not need CasADi and Pinocchio, which are slow to import.
     from gaitswarm.sim.kernel.reference import reference_kernel  # noqa: PLC0415
 
-    return reference_kernel(robot)
+    return reference_kernel(robot, uneven=uneven)
 
 
 def has_native_kernel(robot: Robot, precision: Precision = "double") -> bool:
@@ -138,8 +144,8 @@ def plan_walk(
     codes = trajectory.codes(robot.description.sensors.angle_counts)
     ticks, n_joints = codes.shape
     weight = (robot.mass + scenario.load) * -gravity_on(scenario.slope)[2]
-    joints = trajectory.start
-    height = resting_height(robot, joints, weight) + scenario.drop
+    joints, grid = trajectory.start, height_grid(scenario.terrain)
+    height = resting_height(robot, joints, weight, grid) + scenario.drop
     base = [0.0, 0.0, height, 0.0, 0.0, 0.0, 1.0]
     internal_state = np.zeros(internal_state_size(robot))
     if robot.has_backlash:
@@ -170,6 +176,8 @@ def plan_walk(
         shove_ticks=shove_ticks,
         disturbance=None if noise is None else noise.samples(ticks, n_joints),
         feed_forward=carrying,
+        terrain=grid,
+        corners=body_corners(robot),
     )
 
 

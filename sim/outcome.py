@@ -23,6 +23,7 @@ class Status(IntEnum):
     FELL = 2
     UNREACHABLE = 3
     STALLED = 4
+    STRUCK = 5
 
     @property
     def label(self) -> str:
@@ -50,6 +51,7 @@ _PHRASES: Final = {
     Status.FELL: "the body sank below half its hip height or tilted over 45 degrees",
     Status.UNREACHABLE: "the foot trajectory leaves the leg's reach; reduce stride or hip_height",
     Status.STALLED: "the robot did not move forward, so energy per metre has no value",
+    Status.STRUCK: "a knee or the body struck uneven ground; raise hip_height",
 }
 
 

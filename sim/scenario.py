@@ -22,6 +22,7 @@ from pydantic import (
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import NAME, OWN, alternatives, message_of
 from gaitswarm.sim.near_names import instead_of
+from gaitswarm.sim.terrain import PLANE, Terrain
 from gaitswarm.sim.variables import VariableName, split_name
 
 USUAL_SUPPORT: Final[Mapping[str, float]] = MappingProxyType(
@@ -130,6 +131,11 @@ class Scenario(BaseModel):
         ge=-180.0,
         le=180.0,
         description="Direction in which the ground rises, from straight ahead to the left [deg].",
+    )
+    terrain: Terrain = Field(
+        default=PLANE,
+        description="Shape of the ground, which controller and gait do not know.",
+        examples=[{"kind": "rough", "amplitude": 0.01}],
     )
     stride: float = Field(
         default=0.06,

@@ -135,7 +135,6 @@ def simulating(
     machine = load_robot(robot)
     if noise is not None and noise.kind == "angle":
         machine = with_shafts(machine)
-    kernel = kernel or kernel_of(machine, backend, precision=precision)
     _, timestep = control_steps(machine, physics_rate)
     setups: dict[int, WalkSetup] = {}
     plans: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
@@ -166,27 +165,47 @@ def simulating(
             setups[index] = plan(law)
     return (
         yield from walking(
-            machine, kernel, setups, len(designs), physics_rate=physics_rate, log=log
+            machine,
+            setups,
+            len(designs),
+            kernel=kernel,
+            backend=backend,
+            precision=precision,
+            physics_rate=physics_rate,
+            log=log,
         )
     )
 
 
 def walking(
     robot: Robot,
-    kernel: Kernel,
     setups: Mapping[int, WalkSetup],
     count: int,
     *,
+    kernel: Kernel | None = None,
+    backend: Backend = "auto",
+    precision: Precision = "double",
     physics_rate: int = PHYSICS_RATE,
     log: bool,
 ) -> Walking[Simulation]:
-    """Simulate setups by index of the design; designs without one are unreachable."""
+    """Simulate setups by index of the design; designs without one are unreachable.
+
+    `kernel` is another engine's; else each setup has the robot's for its ground.
+    """
     coding, timestep = control_steps(robot, physics_rate)
     statuses = np.full(count, Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((count, N_OBJECTIVES), np.nan)
     measured = np.full((count, N_MEASUREMENTS), np.nan)
     logs: list[WalkLog | None] = [None] * count
-    results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups.values()]
+    grounds = {setup.terrain is not None for setup in setups.values()}
+    kernels = {
+        uneven: kernel or kernel_of(robot, backend, precision=precision, uneven=uneven)
+        for uneven in grounds
+    }
+    results = yield [
+        WalkRequest(kernels[setup.terrain is not None], coding, setup, log)
+        for setup in setups.values()
+    ]
     for (index, setup), result in zip(setups.items(), results, strict=True):
         statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
         measured[index] = measure(setup, result, coding.substeps, timestep)

@@ -19,6 +19,7 @@ from gaitswarm.cli.options import (
     Precision,
     PreferenceOption,
     RobotOption,
+    TerrainOption,
     WorkerOptions,
     full_id,
     name_and_bounds,
@@ -57,6 +58,7 @@ class CertificateOptions(GivenOptions):
             " eight."
         ),
     ] = None
+    terrain: TerrainOption = None
     ranges: Annotated[
         list[str] | None,
         typer.Option(
@@ -153,7 +155,7 @@ _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 
 def _certificate_spec(design: str, db: str | None, options: Mapping[str, Any]) -> CertificateSpec:
     """Return the spec of a design and options, or of an earlier certificate with options."""
-    from gaitswarm.cli.inputs import chosen_robot, scenario_data
+    from gaitswarm.cli.inputs import chosen_robot, on_terrain, scenario_data
     from gaitswarm.specs import job_spec
 
     document = _earlier(design, db, options) or _new(design, db, options)
@@ -166,6 +168,8 @@ def _certificate_spec(design: str, db: str | None, options: Mapping[str, Any]) -
             for entry in scenario_data(options["scenarios"], options.get("robot"))
         ]
         document |= _still_held_out(document)
+    if "terrain" in options:
+        document["scenarios"] = on_terrain(document["scenarios"], options["terrain"])
     if "robot" in options:
         document["robot"] = chosen_robot(options["robot"])
     document |= _perturbations(document, options)
@@ -229,13 +233,13 @@ def _still_held_out(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
     """Return `variables` and `fixed` of the spec if options change them."""
-    from gaitswarm.sim.worlds import PERTURBATIONS
+    from gaitswarm.sim.worlds import DRAWN
 
     ranges = dict(map(_range, options.get("ranges", ())))
     fixed_values = dict(name_and_value(entry, "set") for entry in options.get("fixed", ()))
     if not ranges and not fixed_values and "only" not in options:
         return {}
-    drawn = document.get("variables") or [variable.name for variable in PERTURBATIONS]
+    drawn = document.get("variables") or [variable.name for variable in DRAWN]
     variables = {entry if isinstance(entry, str) else entry["name"]: entry for entry in drawn}
     if "only" in options:
         names = [name.strip() for name in options["only"].split(",")]

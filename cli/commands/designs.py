@@ -18,6 +18,7 @@ from gaitswarm.cli.options import (
     Precision,
     PreferenceOption,
     RobotOption,
+    TerrainOption,
     TrajectoryOption,
 )
 from gaitswarm.cli.output import Parts, Printed, note
@@ -58,6 +59,7 @@ def simulate(
             " if it has scenarios, else of table 4.2 [default: the job's, else all]."
         ),
     ] = None,
+    terrain: TerrainOption = None,
     trajectory: TrajectoryOption = None,
     preference: PreferenceOption = None,
     world: Annotated[
@@ -81,7 +83,13 @@ def simulate(
     """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
     from pydantic import ValidationError
 
-    from gaitswarm.cli.inputs import given_design, json_object, robot_defaults, scenario_data
+    from gaitswarm.cli.inputs import (
+        given_design,
+        json_object,
+        on_terrain,
+        robot_defaults,
+        scenario_data,
+    )
     from gaitswarm.errors import invalid_request
     from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
@@ -98,6 +106,8 @@ def simulate(
     }
     if given.spec is not None and scenario is None:
         data["scenarios"] = given.spec.resolved_scenarios()
+    if terrain is not None:
+        data["scenarios"] = on_terrain(data["scenarios"], terrain)
     if given.spec is not None and preference is None:
         data["preference"] = given.spec.preference
     if world is not None:

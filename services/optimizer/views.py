@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 T = TypeVar("T")
 
-StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
+StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled", "struck"]
 
 
 class View(BaseModel):

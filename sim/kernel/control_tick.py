@@ -15,6 +15,7 @@ from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import CONTROL_RATE
+from gaitswarm.sim.robot.posture import rotated
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,13 +66,28 @@ def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past
     return pwm
 
 
-def status_of(q: Floats, v: Floats, internal_state: Floats, setup: WalkSetup) -> Status:
-    """Return the status at the end of a control tick; OK means that the walk continues."""
+def status_of(
+    q: Floats,
+    v: Floats,
+    internal_state: Floats,
+    setup: WalkSetup,
+    knees: Floats | None = None,
+) -> Status:
+    """Return the status at the end of a control tick; OK means that the walk continues.
+
+    `knees` are places (L, 3) [m] in the world, required on uneven ground.
+    """
     if not all(np.isfinite(array).all() for array in (q, v, internal_state)):
         return Status.DIVERGED
     upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
-    if q[2] < setup.fall_height or upright < setup.fall_cosine:
+    grid = setup.terrain
+    height = q[2] if grid is None else q[2] - grid.height(*q[:2])
+    if height < setup.fall_height or upright < setup.fall_cosine:
         return Status.FELL
+    if grid is not None and knees is not None:
+        x, y, z = np.concatenate([knees, q[:3] + rotated(q[3:7], setup.corners)]).T
+        if (z < grid.height(x, y)).any():
+            return Status.STRUCK
     return Status.OK
 
 

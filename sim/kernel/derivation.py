@@ -33,14 +33,15 @@ PROCESSES: Final = LimitedProcesses(
 )
 
 
-def derived_source(robot: Robot, precision: Precision = "double") -> str:
+def derived_source(robot: Robot, precision: Precision = "double", *, uneven: bool = False) -> str:
     """Derive a kernel's C source."""
     if robot.ships:
-        return kernel_source(robot, precision)
+        return kernel_source(robot, precision, uneven=uneven)
     request = {
         "description": robot.description.model_dump(mode="json"),
         "urdf": robot.urdf.text,
         "precision": precision,
+        "uneven": uneven,
     }
     try:
         return str(PROCESSES.ask(request)["source"])
@@ -53,7 +54,7 @@ def derived_source(robot: Robot, precision: Precision = "double") -> str:
 def _answer(request: Document) -> Document:
     description = RobotDescription.model_validate(request["description"])
     robot = assembled(description, request["urdf"])
-    return {"source": kernel_source(robot, request["precision"])}
+    return {"source": kernel_source(robot, request["precision"], uneven=request["uneven"])}
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ from gaitswarm.sim.kernel.walk import (
 )
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.terrain import HeightGrid
 
 Floats = NDArray[np.float64]
 
@@ -78,12 +79,23 @@ class SensorErrorsStructure(ctypes.Structure):
     ]
 
 
+class _Terrain(ctypes.Structure):
+    _fields_ = [
+        ("heights", ctypes.c_void_p),
+        ("cells", 2 * ctypes.c_int64),
+        *_fields(2 * ctypes.c_double, "origin", "repeats"),
+        *_fields(ctypes.c_double, "per_metre", "scale", "top"),
+        ("corners", 12 * ctypes.c_double),
+    ]
+
+
 class Walker(ctypes.Structure):
     """A walk: input arrays, addresses of its results, and scalar results."""
 
     _fields_ = [
         *_fields(ctypes.c_void_p, "q0", "internal_state", "parameters", "desired"),
         *_fields(ctypes.c_void_p, "disturbance", "feed_forward"),
+        ("terrain", _Terrain),
         ("sensors", SensorErrorsStructure),
         ("shove", 2 * ctypes.c_int64),
         ("law", _Law),
@@ -161,6 +173,18 @@ class Addresses:
             )
             cached = self._laws[id(law)] = packed, law
         return cached[0]
+
+    def terrain(self, grid: HeightGrid, corners: Floats) -> _Terrain:
+        return _Terrain(
+            self.of(grid.heights, np.float64),
+            grid.cells,
+            grid.origin,
+            grid.repeated,
+            grid.per_metre,
+            grid.scale,
+            grid.top,
+            tuple(corners.ravel().tolist()),
+        )
 
     def _table(self, table: Response | None) -> _Table:
         if table is None:
@@ -283,6 +307,8 @@ class NativeKernel:
             walker.desired = addresses.of(setup.desired, np.int32)
             walker.disturbance = addresses.if_any(setup.disturbance)
             walker.feed_forward = addresses.if_any(setup.feed_forward)
+            if setup.terrain is not None:
+                walker.terrain = addresses.terrain(setup.terrain, setup.corners)
             errors = setup.sensors
             walker.sensors = SensorErrorsStructure(errors.scales, errors.delays, errors.seed)
             walker.shove[:] = setup.shove_ticks
@@ -331,18 +357,20 @@ _loading: Final[dict[bytes, threading.Lock]] = {}
 _registering: Final = threading.Lock()
 
 
-def native_kernel(robot: Robot, precision: Precision = "double") -> NativeKernel | None:
+def native_kernel(
+    robot: Robot, precision: Precision = "double", *, uneven: bool = False
+) -> NativeKernel | None:
     """Return the robot's kernel, compiled on first use and loaded once per process.
 
     Robots that differ only in run-time parameters share a library. Other kernels can be loaded
     while one is compiled.
     """
-    identity = kernel_identity(robot, precision)
+    identity = kernel_identity(robot, precision, uneven=uneven)
     with _registering:
         loading = _loading.setdefault(identity, threading.Lock())
     with loading:
         if identity not in _libraries:
-            _libraries[identity] = _load(robot, precision, None, ())
+            _libraries[identity] = _load(robot, precision, None, (), uneven=uneven)
         library = _libraries[identity]
     if library is None:
         return None
@@ -362,19 +390,25 @@ def load_kernel(
     *,
     compile_for: Target | None = None,
     extra_flags: Sequence[str] = (),
+    uneven: bool = False,
 ) -> NativeKernel | None:
     """Load a kernel without caching it in this process, to compare ways of compiling."""
-    library = _load(robot, precision, compile_for, extra_flags)
+    library = _load(robot, precision, compile_for, extra_flags, uneven=uneven)
     return None if library is None else NativeKernel(robot, library)
 
 
 def _load(
-    robot: Robot, precision: Precision, compile_for: Target | None, extra_flags: Sequence[str]
+    robot: Robot,
+    precision: Precision,
+    compile_for: Target | None,
+    extra_flags: Sequence[str],
+    *,
+    uneven: bool,
 ) -> ctypes.CDLL | None:
     return load_library(
         "kernel" if precision == "double" else "kernel-single",
-        kernel_identity(robot, precision),
-        lambda: derived_source(robot, precision),
+        kernel_identity(robot, precision, uneven=uneven),
+        lambda: derived_source(robot, precision, uneven=uneven),
         compile_for=compile_for,
         extra_flags=extra_flags,
     )

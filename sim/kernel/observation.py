@@ -119,7 +119,12 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         parameters = np.tile(setup.parameters, (walked, 1))
         pushes = Layout(robot).slices["push"]
         parameters[:begin, pushes] = parameters[end:, pushes] = 0.0
-        observed = _observing(robot, walked)(*(part[:walked].T for part in inputs), parameters.T)
+        arguments = [part[:walked].T for part in (*inputs, parameters)]
+        if setup.terrain is not None:
+            places = np.array(_placing(robot, walked)(arguments[0])).T
+            x, y, *_ = places.reshape(-1, 6).T
+            arguments.append(np.stack(setup.terrain.under(x, y), axis=1).reshape(walked, -1).T)
+        observed = _observing(robot, walked, uneven=setup.terrain is not None)(*arguments)
         for target, part in zip(seen, observed, strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen
@@ -141,11 +146,18 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
 
 
 @lru_cache(maxsize=16)
-def _observing(robot: Robot, instants: int) -> Any:
+def _observing(robot: Robot, instants: int, *, uneven: bool) -> Any:
     # Imported here: with a compiled kernel, only logs need CasADi.
     from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
 
-    return physics_model(robot).observe.map(instants)
+    return physics_model(robot, uneven=uneven).observe.map(instants)
+
+
+@lru_cache(maxsize=16)
+def _placing(robot: Robot, instants: int) -> Any:
+    from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
+
+    return physics_model(robot, uneven=True).places.map(instants)
 
 
 def sensed_currents(

@@ -110,7 +110,7 @@ class ReferenceKernel:
                     peaks, lifted = np.maximum(peaks, step.peaks), np.maximum(lifted, step.heights)
             if (tick + 1) % setup.cycle == 0:
                 clearance, lifted = min(clearance, float(lifted.min())), np.zeros_like(lifted)
-            status = status_of(step.q, step.v, step.internal_state, setup)
+            status = status_of(step.q, step.v, step.internal_state, setup, step.knees())
             if status is not Status.OK:
                 break
         states = padded_states(rows, setup.ticks) if log else None
@@ -138,9 +138,13 @@ class Stepper:
         kicked = [np.zeros_like(array) for array in (self.v, self.internal_state)]
         drifted = [np.zeros_like(array) for array in (self.q, self.internal_state)]
         state = [self.q, self.v, self.internal_state]
+        self._terrain, self._places = setup.terrain, model.places
+        self._placed = np.zeros((model.kick.numel_out(5), 6))  # at the last step
+        self._patches = np.zeros((model.kick.numel_out(5), 3))
+        patches = [] if self._terrain is None else [self._patches.ravel()]
         self._kick = _buffered(
             model.kick,
-            [*state, self.duty, self.disturbance, self.parameters],
+            [*state, self.duty, self.disturbance, self.parameters, *patches],
             [*kicked, self.current, self.integrands, self.peaks, self.heights, self.landing],
         )
         self._drift = _buffered(model.drift, [*state, self._time], drifted)
@@ -159,6 +163,10 @@ class Stepper:
             return self.internal_state[:n], self.internal_state[n : 2 * n]
         return self.q[7:], self.v[6:]
 
+    def knees(self) -> Floats | None:
+        """Return the places of the knees (L, 3) [m] in the world, on uneven ground."""
+        return None if self._terrain is None else self._placed[:, 3:]
+
     def push(self, tick: int) -> None:
         """Apply the shove's force during its ticks."""
         begin, end = self._shove_ticks
@@ -170,6 +178,10 @@ class Stepper:
 
     def kick(self) -> None:
         """Advance the velocities by a step in place; measurements are those of its middle."""
+        if self._terrain is not None:
+            self._placed = np.asarray(self._places(self.q)).reshape(-1, 6)
+            x, y, *_ = self._placed.T
+            self._patches[:] = np.stack(self._terrain.under(x, y), axis=1)
         self._kick[1]()
         for array, after in self._kicked:
             array[:] = after
@@ -193,5 +205,5 @@ def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]
 
 
 @lru_cache(maxsize=8)
-def reference_kernel(robot: Robot) -> ReferenceKernel:
-    return ReferenceKernel(robot, physics_model(robot))
+def reference_kernel(robot: Robot, *, uneven: bool = False) -> ReferenceKernel:
+    return ReferenceKernel(robot, physics_model(robot, uneven=uneven))

@@ -20,6 +20,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
 from gaitswarm.sim.robot.description import EnergyConvention
+from gaitswarm.sim.terrain import HeightGrid
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -169,6 +170,9 @@ class WalkSetup:
     # torques with which the joints carry the robot, of which torque-controlled actuators receive
     # the control law's share, (T, J) [N m]; or None
     feed_forward: Floats | None = None
+    # uneven ground, and the corners of the body's underside in its frame (4, 3) [m]
+    terrain: HeightGrid | None = None
+    corners: Floats = field(default_factory=lambda: np.zeros((4, 3)))
 
     def smoothing(self, refinement: int) -> float:
         """Return `current_smoothing` for steps that are shorter by a factor [1]."""

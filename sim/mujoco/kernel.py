@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import mujoco
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.control_tick import (
     InnerLoop,
     Past,
@@ -40,11 +42,19 @@ from gaitswarm.sim.kernel.walk import (
 )
 from gaitswarm.sim.mujoco.gears import gears_of
 from gaitswarm.sim.mujoco.ground import GROUNDS
-from gaitswarm.sim.mujoco.mjcf import Rig, Soles, Surroundings, mjcf
+from gaitswarm.sim.mujoco.mjcf import (
+    Rig,
+    Soles,
+    Surroundings,
+    height_field,
+    mjcf,
+    reach_of,
+)
 from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.inertia import BodyInertia, parallel_axis
+from gaitswarm.sim.terrain import HeightGrid
 
 Floats = NDArray[np.float64]
 
@@ -104,6 +114,8 @@ class MujocoKernel:
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute the walks one after the other."""
         for setup in setups:
+            if setup.terrain is not None and self._soles != "none":
+                raise SimulationInputError("MuJoCo's contacts are on flat ground only")
             check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(
                 joints=self._robot.n_joints,
@@ -153,7 +165,7 @@ class MujocoKernel:
                 break
             if (tick + 1) % setup.cycle == 0:
                 clearance, lifted = min(clearance, float(lifted.min())), np.zeros_like(lifted)
-            status = status_of(step.q, step.v, step.internal_state, setup)
+            status = status_of(step.q, step.v, step.internal_state, setup, step.knees)
             if status is not Status.OK:
                 break
         states = padded_states(rows, setup.ticks) if log else None
@@ -166,7 +178,7 @@ class _Stepper:
     def __init__(self, robot: Robot, setup: WalkSetup, soles: Soles) -> None:
         self._numbers = numbers = Layout(robot).fields(setup.parameters)
         self._pushed = soles == "none"
-        self._m = m = _model(robot, numbers, soles)
+        self._m = m = _model(robot, setup, soles)
         self._d = mujoco.MjData(m)
         x, y, z, w = setup.start[3:7].tolist()
         self._d.qpos[:] = [*setup.start[:3], w, x, y, z, *setup.start[7:]]
@@ -177,6 +189,7 @@ class _Stepper:
         self._ahead, self._up = self._d.xmat[1, 0:6:3], self._d.xmat[1, 6:9]
         # Positions [m] and velocities [m/s] of the feet, by MuJoCo's sensors.
         self._of_feet: tuple[Floats, Floats] = tuple(self._d.sensordata.reshape(2, -1, 3))
+        self._terrain = None if setup.terrain is None else _Terrain(m, self._d, setup.terrain)
         self._gears = gears_of(robot, numbers, setup.start[7:])
         self._ground = GROUNDS[robot.description.contact_law](numbers)
         self._resistance = robot.actuators().resistance
@@ -212,7 +225,26 @@ class _Stepper:
     def landing(self, time: float) -> bool:
         """Whether a foot may touch down within a time [s]."""
         self._derive()
-        return self._ground.landing(*self._of_feet, time)
+        position, velocity, _ = self._on_ground()
+        return self._ground.landing(position, velocity, time)
+
+    @property
+    def knees(self) -> Floats:
+        """Places of the tibias' joints in the world, (L, 3) [m]."""
+        return np.asarray(self._d.xpos[self._feet])
+
+    def _on_ground(self) -> tuple[Floats, Floats, Floats | None]:
+        """Positions and velocities of the feet in the ground's axes, and these axes (L, 3, 3).
+
+        Heights are distances from the ground; axes are None for those of the world.
+        """
+        position, velocity = self._of_feet
+        if self._terrain is None:
+            return position, velocity, None
+        heights, axes = self._terrain.below(position)
+        above = position.copy()
+        above[:, :2], above[:, 2] = 0.0, (position[:, 2] - heights) * axes[:, 2, 2]
+        return above, np.einsum("lij,lj->li", axes, velocity), axes
 
     def refine(self, timestep: float) -> None:
         """Set the length of the following steps [s]."""
@@ -247,15 +279,16 @@ class _Stepper:
                 numbers["jam_stiffness"] * (angles - numbers["jam_angle"])
                 + numbers["jam_damping"] * rates
             )
+        position, velocity, axes = self._on_ground()
         if self._pushed:
-            self._push_feet()
+            self._push_feet(position, velocity, axes)
         dry, firm = self._gears.dry, not self._gears.memory
         if firm and dry.torques.size:
             motors = self._torque_constants * actuation.drive.current
             m.dof_frictionloss[6:] = dry.limits(motors, rates)
         (ahead_x, ahead_y), (x, y) = self._ahead.tolist(), self._velocity[:2].tolist()
         forward = (ahead_x * x + ahead_y * y) / math.hypot(ahead_x, ahead_y)
-        (position, velocity), (pitch, roll, level) = self._of_feet, self._up.tolist()
+        pitch, roll, level = self._up.tolist()
         self.heights = position[:, 2] - numbers["sole"]
         slip = np.hypot(velocity[:, 0], velocity[:, 1]) @ (self.heights < 0.0)
         mujoco.mj_fwdActuation(m, d)
@@ -302,28 +335,62 @@ class _Stepper:
         mujoco.mj_fwdVelocity(m, d)
         mujoco.mj_sensorVel(m, d)
 
-    def _push_feet(self) -> None:
-        """Add the ground's forces to those already applied."""
-        m, d = self._m, self._d
-        position, velocity = self._of_feet
+    def _push_feet(self, position: Floats, velocity: Floats, axes: Floats | None) -> None:
+        """Add the ground's forces, from `_on_ground`, to those already applied."""
+        m, d, places = self._m, self._d, self._of_feet[0]
         forces, self._ground.memory = self._ground.forces(position, velocity, m.opt.timestep)
         for foot in forces[:, 2].nonzero()[0].tolist():
+            force = forces[foot] if axes is None else axes[foot].T @ forces[foot]
             mujoco.mj_applyFT(
-                m, d, forces[foot], _NO_TORQUE, position[foot], self._feet[foot], self._applied
+                m, d, force, _NO_TORQUE, places[foot], self._feet[foot], self._applied
             )
+
+
+class _Terrain:
+    """Uneven ground as MuJoCo's height field has it: rays from above find height and normal."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, grid: HeightGrid) -> None:
+        self._m, self._d, self._grid = m, d, grid
+        self._geom = int(m.geom("ground").id)
+        # Height from which rays fall [m]: MuJoCo takes longer for a longer ray.
+        self._sky = float(m.geom_pos[self._geom, 2] + m.hfield_size[0, 2] + 0.01)
+
+    def below(self, places: Floats) -> tuple[Floats, Floats]:
+        """Return heights (L,) [m] and axes (L, 3, 3) of the ground: x and y turned, and normals."""
+        heights, axes = np.empty(len(places)), np.empty((len(places), 3, 3))
+        for foot, place in enumerate(places):
+            above, normal = np.array([place[0], place[1], self._sky]), np.empty(3)
+            fall = mujoco.mj_rayHfield(self._m, self._d, self._geom, above, _DOWN, normal)
+            heights[foot] = self._sky - fall
+            if fall < 0.0:  # beyond the field
+                heights[foot], along, across = self._grid.under(place[0], place[1])
+                normal = np.array([-along, -across, 1.0])
+            normal /= math.sqrt(normal @ normal)
+            ahead = np.array([normal[2], 0.0, -normal[0]]) / math.hypot(normal[0], normal[2])
+            axes[foot] = ahead, np.cross(normal, ahead), normal
+        return heights, axes
+
+
+_DOWN: Final = np.array([0.0, 0.0, -1.0])
 
 
 _NO_TORQUE: Final = np.zeros(3)
 
 
-def _model(robot: Robot, numbers: Mapping[str, Floats], soles: Soles) -> mujoco.MjModel:
-    """The robot with the masses, gravity and feet of a walk's parameters."""
-    surroundings = _surroundings(robot, numbers)
+def _model(robot: Robot, setup: WalkSetup, soles: Soles) -> mujoco.MjModel:
+    """The robot with the masses, gravity, feet and ground of a walk."""
+    surroundings = _surroundings(robot, Layout(robot).fields(setup.parameters))
+    if setup.terrain is not None:
+        reach = reach_of(setup.ticks * CONTROL_PERIOD)
+        surroundings = replace(surroundings, ground=setup.terrain, reach=reach)
     rig = Rig()
     if soles != "none":
         feet = Feet(even_drags(robot, surroundings), points=soles == "points")
         rig = with_contacts(robot, surroundings, rig, feet)
-    return mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
+    model = mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
+    if surroundings.ground is not None:
+        model.hfield_data[:] = height_field(surroundings, soles).heights.ravel()
+    return model
 
 
 def _surroundings(robot: Robot, numbers: Mapping[str, Floats]) -> Surroundings:

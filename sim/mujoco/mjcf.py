@@ -6,9 +6,10 @@ the leg's name, with a sensor of its position and one of its velocity.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -20,6 +21,7 @@ from gaitswarm.sim.robot.description import Contact
 from gaitswarm.sim.robot.inertia import BodyInertia
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.terrain import HeightGrid, height_grid
 
 if TYPE_CHECKING:
     from gaitswarm.sim.robot.shapes import Shape, VisibleLink
@@ -56,6 +58,8 @@ class Surroundings:
     body: BodyInertia  # inertia of the body with its load, in its own frame
     gravity: Floats  # in a world whose z axis is normal to the ground, (3,) [m/s2]
     contacts: tuple[Contact, ...]  # of the feet, in the order of the legs
+    ground: HeightGrid | None = None  # if it is uneven
+    reach: float = 0.0  # distance from the start to which uneven ground extends [m]
 
     @classmethod
     def of(cls, robot: Robot, scenario: Scenario | None = None) -> Surroundings:
@@ -66,7 +70,43 @@ class Surroundings:
         load = BodyInertia(scenario.load, at, np.zeros((3, 3)))
         body = robot.body.joined(load) if scenario.load else robot.body
         gravity = gravity_on(scenario.slope, scenario.slope_direction)
-        return cls(body, gravity, robot.contacts())
+        ground, reach = height_grid(scenario.terrain), reach_of(scenario.duration)
+        return cls(body, gravity, robot.contacts(), ground, reach)
+
+
+def reach_of(duration: float) -> float:
+    """Distance [m] that a robot does not leave in a time [s]."""
+    return 1.0 + 0.25 * duration
+
+
+class HeightField(NamedTuple):
+    """Uneven ground around the start as MuJoCo has it."""
+
+    heights: Floats  # from 0 to 1, (n, m) over y and x
+    size: tuple[float, float, float]  # half the extents along x and y, and the range of z [m]
+    at: tuple[float, float, float]  # of its middle, at the least height [m]
+
+
+def height_field(surroundings: Surroundings, soles: Soles) -> HeightField:
+    """Return the ground within reach, at the corners of its own cells unless soles are spheres."""
+    ground, reach = surroundings.ground, surroundings.reach
+    assert ground is not None  # noqa: S101
+    cell, axes = ground.cell, []
+    if soles == "spheres":
+        # A sphere touches the triangles of all cells below it, each with the whole stiffness.
+        cell = max(cell, 4.0 * max(contact.sole for contact in surroundings.contacts))
+    for origin, cells in zip(ground.origin, ground.cells, strict=True):
+        first, last = math.floor((-reach - origin) / cell), math.ceil((reach - origin) / cell)
+        corners = origin + cell * np.arange(first, last + 1.0)
+        axes.append(corners if cells > 1 else np.array([-reach, reach]))
+    (x, y), heights = axes, ground.height(*np.meshgrid(*axes))
+    low = float(heights.min())
+    # MuJoCo requires a positive range.
+    rise = max(float(heights.max()) - low, 1e-6)
+    half_x, half_y, middle_x, middle_y = (
+        float(0.5 * (axis[-1] + sign * axis[0])) for sign in (-1.0, 1.0) for axis in (x, y)
+    )
+    return HeightField((heights - low) / rise, (half_x, half_y, rise), (middle_x, middle_y, low))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +148,9 @@ def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
     world = ET.SubElement(root, "worldbody")
     if rig.looks:
         ET.SubElement(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
-    if rig.soles != "none":
+    if surroundings.ground is not None:
+        _add_height_field(root, world, surroundings, rig)
+    elif rig.soles != "none":
         height = repr(_plane_height(surroundings.contacts, rig.soles))
         ET.SubElement(world, "geom", name="ground", type="plane", size="0 0 1", pos=f"0 0 {height}")
     drawn = _shapes(robot, rig.looks)
@@ -136,8 +178,26 @@ def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
+def _add_height_field(
+    root: ET.Element, world: ET.Element, surroundings: Surroundings, rig: Rig
+) -> None:
+    """Add the ground; with visible shapes its heights are in the text, else they are to be set."""
+    field = height_field(surroundings, rig.soles)
+    rows, columns = field.heights.shape
+    data = {"elevation": " ".join(f"{x:.4g}" for x in field.heights.ravel())} if rig.looks else {}
+    ET.SubElement(
+        ET.SubElement(root, "asset"),
+        "hfield",
+        {"name": "ground", "nrow": str(rows), "ncol": str(columns)} | data,
+        size=_numbers([*field.size, 0.1]),
+    )
+    x, y, low = field.at
+    at = _numbers([x, y, low + _plane_height(surroundings.contacts, rig.soles)])
+    ET.SubElement(world, "geom", name="ground", type="hfield", hfield="ground", pos=at)
+
+
 def _plane_height(contacts: Sequence[Contact], soles: Soles) -> float:
-    if soles == "spheres":
+    if soles != "points":
         return 0.0
     lengths = {contact.sole for contact in contacts}
     if len(lengths) > 1:

@@ -112,16 +112,17 @@ def _pair(
 def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
     """Write a robot in a scenario as MJCF for MuJoCo's viewer.
 
-    It has the scenario's load and slope, joints with the motors' voltages [V] as controls (torques
-    [N m] if torque-controlled), visible shapes, and a keyframe `start`, the pose at the beginning
-    of a walk through the scenario. Backlash, limits of torque by speed, the battery's sag and,
-    of dry friction, all but `coulomb_friction` are omitted.
+    It has the scenario's load, slope and terrain, joints with the motors' voltages [V] as controls
+    (torques [N m] if torque-controlled), visible shapes, and a keyframe `start`, the pose at the
+    beginning of a walk through the scenario. Backlash, limits of torque by speed, the battery's sag
+    and, of dry friction, all but `coulomb_friction` are omitted.
     """
     require_reachable(robot, scenario)
     surroundings = Surroundings.of(robot, scenario)
     joints = desired_angles(robot, scenario).start
     mass = robot.mass + scenario.load
-    height = resting_height(robot, joints, mass * -float(surroundings.gravity[2]))
+    weight = mass * -float(surroundings.gravity[2])
+    height = resting_height(robot, joints, weight, surroundings.ground)
     rig = Rig(
         voltage_motors=True,
         looks=visible_links(robot, scenario.load),

@@ -11,6 +11,7 @@ from gaitswarm.sim.robot.chain import chain_of
 from gaitswarm.sim.robot.legs import turned
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.terrain import HeightGrid
 
 Floats = NDArray[np.float64]
 
@@ -65,6 +66,13 @@ def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[
     return np.stack(feet, axis=1), moment / (robot.mass + load)
 
 
+def rotated(quaternion: Floats, points: Floats) -> Floats:
+    """Return points (n, 3) turned by a quaternion x y z w."""
+    axis, w = quaternion[:3], quaternion[3]
+    turn = 2.0 * np.cross(axis, points)
+    return np.asarray(points + w * turn + np.cross(axis, turn))
+
+
 def _turn(axis: Floats, angle: float) -> Floats:
     """Rotation matrix about a unit vector, by Rodrigues' formula."""
     x, y, z = axis.tolist()
@@ -73,10 +81,18 @@ def _turn(axis: Floats, angle: float) -> Floats:
     return np.asarray(turn)
 
 
-def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
-    """Return the height [m] of a level body at which the feet's springs carry a weight [N]."""
+def resting_height(
+    robot: Robot, joints: Floats, weight: float, grid: HeightGrid | None = None
+) -> float:
+    """Return the height [m] of a level body at which the feet's springs carry a weight [N].
+
+    The body stands over the origin; `grid` are the heights of the ground.
+    """
     contacts = robot.contacts()
     reach = np.array([c.sole for c in contacts]) - feet_below_body(robot, joints)
+    if grid is not None:
+        x, y, _ = feet_in_body(robot, joints).T
+        reach = reach + grid.height(x, y)
     return height_on_soles(reach, np.array([c.stiffness for c in contacts]), weight)
 
 

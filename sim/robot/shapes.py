@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Final, Literal
 from xml.etree import ElementTree as ET
@@ -159,6 +160,30 @@ def _trunk(robot: Robot) -> Shape:
     length, width, _ = np.maximum(high - low, widest)
     size = np.array([length, width, 0.5 * min(length, width)])
     return _shape("box", size, 0.5 * (low + high), _UPRIGHT, "body")
+
+
+@lru_cache(maxsize=16)
+def body_corners(robot: Robot) -> Floats:
+    """Return the corners (4, 3) [m] of the underside of a box about the body's solids."""
+    body = next(iter(robot.urdf.links.values()))
+    boxes = [
+        (solid.origin.xyz, np.abs(solid.origin.matrix()) @ _half_extent(solid.kind, solid.size))
+        for solid in body.solids()
+    ]
+    if not boxes:
+        trunk = _trunk(robot)
+        boxes = [(np.array(trunk.origin[:3]), 0.5 * np.array(trunk.size))]
+    low = np.min([at - half for at, half in boxes], axis=0)
+    high = np.max([at + half for at, half in boxes], axis=0)
+    return np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
+
+
+def _half_extent(kind: SolidKind, size: Floats) -> Floats:
+    if kind == "box":
+        return 0.5 * size
+    radius, length = float(size[0]), float(size[-1]) if len(size) > 1 else 0.0
+    ends = radius if kind in ("sphere", "capsule") else 0.0
+    return np.array([radius, radius, 0.5 * length + ends])
 
 
 def _capsule(end: Floats, radius: float, role: Role) -> Shape:

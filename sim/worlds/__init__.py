@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from gaitswarm.sim.scenario import HELD_OUT
-from gaitswarm.sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
+from gaitswarm.sim.worlds.perturbations import DRAWN, PERTURBATIONS, check_worlds, sample_worlds
 from gaitswarm.sim.worlds.walks import EngineWalk, MeasuredPerturbedWalk, PerturbedWalk, WorldWalk
 
 __all__ = [
+    "DRAWN",
     "HELD_OUT",
     "PERTURBATIONS",
     "EngineWalk",

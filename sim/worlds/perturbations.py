@@ -203,9 +203,17 @@ _TABLE: Final = (
         "world_seed",
         (0.0, _SEEDS - 1.0),
         "1",
-        "Seed of the randomness within the world: sensor noise, start angles.",
+        "Seed of the randomness within the world: sensor noise, start angles, place on rough"
+        " ground.",
         limits=(0.0, 2.0**53),
         kind="integer",
+    ),
+    _perturbation(
+        "roughness",
+        (0.0, 0.02),
+        "m",
+        "Amplitude of rough ground (assumed); drawn only if chosen.",
+        limits=(0.0, 0.5),
     ),
 )
 
@@ -214,6 +222,9 @@ PERTURBATIONS: Final[tuple[Variable, ...]] = tuple(variable for variable, _ in _
 
 Bounds are the default ranges to draw worlds from. Factors of table 2.7 span the widest of its
 intervals, relative to the optimum, among all legs."""
+
+DRAWN: Final = tuple(v for v in PERTURBATIONS if v.name != "roughness")
+"""Drawn by default."""
 
 NOMINAL: Final[Mapping[str, float]] = MappingProxyType(
     {v.name: v.default for v in PERTURBATIONS if v.default is not None}
@@ -255,7 +266,7 @@ def _first(wrong: NDArray[np.bool_], column: Floats) -> str:
     return f"{column[world]:g}" + (f" in world {world}" if len(column) > 1 else "")
 
 
-def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = PERTURBATIONS) -> Floats:
+def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = DRAWN) -> Floats:
     """Draw worlds (count, len(choice)), each variable uniformly between its bounds.
 
     Each variable has its own Philox stream, so its values depend neither on the number of worlds

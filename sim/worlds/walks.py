@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.case import MeasuredCase, SimulatedCase
 from gaitswarm.sim.controllers import ControlLaw, ControllerName, control_law
+from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.parameters import Layout, gravity_on
 from gaitswarm.sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
@@ -21,9 +22,10 @@ from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
 from gaitswarm.sim.mujoco.mjcf import Soles
 from gaitswarm.sim.outcome import N_OBJECTIVES, Objective, Outcome
 from gaitswarm.sim.robot import Robot, RobotSource, load_robot
-from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles
+from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles, rotated
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, plan_of_scenario, walking
+from gaitswarm.sim.terrain import HeightGrid, Plane, Rough, rough_grid
 from gaitswarm.sim.worlds.perturbations import NOMINAL, check_worlds
 
 Floats = NDArray[np.float64]
@@ -56,13 +58,14 @@ def perturbed_setups(
         name: columns.get(name, np.full(len(worlds), default)) for name, default in NOMINAL.items()
     }
     parameters = _parameters(robot, scenario, nominal.parameters, values)
-    starts = _starts(robot, scenario, nominal, parameters, values)
+    grounds = _grounds(scenario, nominal, values)
+    starts = _starts(robot, scenario, nominal, parameters, values, grounds)
     internal_states = np.tile(nominal.internal_state, (len(worlds), 1))
     if robot.has_backlash:
         internal_states[:, : robot.n_joints] = starts[:, 7:]
     drops = nominal.drop + values["start_height"]
     errors = _sensor_errors(values)
-    rows = zip(starts, internal_states, parameters, drops.tolist(), errors, strict=True)
+    rows = zip(starts, internal_states, parameters, drops.tolist(), errors, grounds, strict=True)
     return [
         replace(
             nominal,
@@ -71,9 +74,28 @@ def perturbed_setups(
             parameters=packed,
             drop=drop,
             sensors=sensors,
+            terrain=ground,
         )
-        for start, internal_state, packed, drop, sensors in rows
+        for start, internal_state, packed, drop, sensors, ground in rows
     ]
+
+
+def _grounds(
+    scenario: Scenario, nominal: WalkSetup, values: Mapping[str, Floats]
+) -> list[HeightGrid | None]:
+    """Uneven ground of every world; the world's seed is the place at which the robot starts."""
+    terrain, roughness = scenario.terrain, values["roughness"].tolist()
+    if any(roughness) and not isinstance(terrain, Plane | Rough):
+        raise SimulationInputError(
+            f"roughness: the ground of scenario {scenario.name!r} is of kind {terrain.kind};"
+            " worlds add roughness to planes and rough ground only"
+        )
+    rough = rough_grid(
+        terrain if isinstance(terrain, Rough) else Rough(kind="rough", amplitude=0.0)
+    )
+    grounds = [replace(rough, scale=scale) if scale else nominal.terrain for scale in roughness]
+    seeds = map(round, values["world_seed"].tolist())
+    return [ground and ground.placed(seed) for ground, seed in zip(grounds, seeds, strict=True)]
 
 
 def _parameters(
@@ -146,6 +168,7 @@ def _starts(
     nominal: WalkSetup,
     parameters: Floats,
     values: Mapping[str, Floats],
+    grounds: Sequence[HeightGrid | None],
 ) -> Floats:
     """Start positions (n, 7+J), at which each world's soles carry its weight, or above."""
     slices = Layout(robot).slices
@@ -161,11 +184,15 @@ def _starts(
     mass = robot.mass + further + (scenario.load + values["load_added"])
     weight = mass * -parameters[:, slices["gravity"]][:, 2]
     tilts = np.radians(np.stack([values["start_roll"], values["start_pitch"]], axis=1))
-    for start, packed, carried, tilt in zip(
-        starts, parameters, weight.tolist(), tilts, strict=True
+    for start, packed, carried, tilt, ground in zip(
+        starts, parameters, weight.tolist(), tilts, grounds, strict=True
     ):
         start[3:7], up = _attitude(*tilt.tolist())
-        reach = packed[slices["sole"]] - feet_in_body(robot, start[7:]) @ up
+        feet = feet_in_body(robot, start[7:])
+        reach = packed[slices["sole"]] - feet @ up
+        if ground is not None:
+            x, y, _ = rotated(start[3:7], feet).T
+            reach = reach + ground.height(x, y)
         start[2] = height_on_soles(reach, packed[slices["stiffness"]], carried)
     starts[:, 2] += nominal.drop + values["start_height"]
     return starts
@@ -213,9 +240,12 @@ class PerturbedWalk(SimulatedCase):
         self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
     ) -> Walking[Simulation]:
         robot = load_robot(self.robot)
-        kernel = kernel or kernel_of(robot, precision=self.precision)
         setups = self._setups(robot, designs)
-        return (yield from walking(robot, kernel, setups, len(designs), log=log))
+        return (
+            yield from walking(
+                robot, setups, len(designs), kernel=kernel, precision=self.precision, log=log
+            )
+        )
 
     def _setups(self, robot: Robot, designs: Floats) -> dict[int, WalkSetup]:
         """Setups by index of the design, without gaits out of the legs' reach."""
@@ -286,9 +316,12 @@ class WorldWalk(SimulatedCase):
     ) -> Walking[Simulation]:
         check_worlds(self.variables, designs)
         robot = load_robot(self.robot)
-        kernel = kernel or kernel_of(robot, precision=self.precision)
         setups = dict(enumerate(self._setups(robot, designs)))
-        return (yield from walking(robot, kernel, setups, len(designs), log=log))
+        return (
+            yield from walking(
+                robot, setups, len(designs), kernel=kernel, precision=self.precision, log=log
+            )
+        )
 
     def _setups(self, robot: Robot, worlds: Floats) -> list[WalkSetup]:
         """One setup per world; none for a gait out of the legs' reach."""

@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import (
     certificate_scenarios,
 )
 from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS
-from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
+from gaitswarm.sim.worlds import DRAWN, sample_worlds
 from tests.certificate.examples import DOCUMENT, PI, small
 
 
@@ -90,7 +90,7 @@ def test_the_nominal_world_is_clipped_to_the_ranges() -> None:
 def test_a_perturbation_that_is_held_is_the_same_in_every_world() -> None:
     spec = small(variables=None, fixed={"slope_added": 2.0})
     assert {spec.world(k)["slope_added"] for k in range(5)} == {2.0}
-    assert len(spec.design_space().variables) == len(PERTURBATIONS) - 1
+    assert len(spec.design_space().variables) == len(DRAWN) - 1
 
 
 def test_the_default_is_the_tuned_and_held_out_scenarios() -> None:

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaitswarm.cli.inputs import on_terrain
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
-from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.terrain import PLANE, Grid
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.walks import PUBLISHED_A
 
@@ -235,3 +237,31 @@ def test_a_world_that_cannot_be_is_refused(gaitswarm: Gaitswarm, world: str, sai
     result = gaitswarm("simulate", "--design", "published:A", "--world", world)
     assert result.code == 2
     assert said in result.err
+
+
+@pytest.mark.parametrize(
+    ("terrain", "kind"),
+    [("rough:0.01:0.2:3", "rough"), ("stairs:0.02", "stairs"), ('{"kind": "plane"}', "plane")],
+)
+def test_terrain_of_the_option_is_that_of_every_scenario(terrain: str, kind: str) -> None:
+    (scenario,) = on_terrain(["normal-fast"], terrain)
+    found = Scenario.model_validate(scenario)
+    assert found.terrain.kind == kind
+    assert found.model_copy(update={"terrain": PLANE}) == SCENARIOS[0]
+
+
+def test_heights_are_read_from_a_csv(tmp_path: Path) -> None:
+    file = tmp_path / "heights.csv"
+    file.write_text("0,0.01\n0.02,0\n", encoding="utf-8")
+    (scenario,) = on_terrain(["normal-fast"], f"grid:{file}:0.5")
+    assert Scenario.model_validate(scenario).terrain == Grid(
+        kind="grid", cell=0.5, heights=((0.0, 0.01), (0.02, 0.0))
+    )
+
+
+@pytest.mark.parametrize("terrain", ["sand", "rough:a", "stairs:1:2:3:4", "grid:none.csv:1"])
+def test_a_wrong_terrain_is_refused_by_its_field(terrain: str, gaitswarm: Gaitswarm) -> None:
+    options = ("simulate", "--design", "published:A", "--scenario", "1", "--terrain", terrain)
+    result = gaitswarm(*options)
+    assert result.code == 2
+    assert "terrain" in result.err

@@ -13,6 +13,7 @@ from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.terrain import PLANE
 from tests.examples import walks
 from tests.examples.robots import changed
 from tests.mujoco.controllers import Coded, FuzzyPi, Pi
@@ -210,3 +211,18 @@ def test_dry_friction_is_that_of_mujoco(backlash: float) -> None:
     theirs, log = walk_in_mujoco(robot, scenario, "pi", design)
     np.testing.assert_allclose(theirs[:5], ours[:5], rtol=0.01)
     assert np.isfinite(log.current).all()
+
+
+def test_mujocos_height_field_is_the_kernels_uneven_ground() -> None:
+    terrain = {"kind": "rough", "amplitude": 0.01}
+    document = one_cycle(NORMAL_FAST).model_dump() | {"cycle_time": 0.7, "terrain": terrain}
+    scenario = Scenario.model_validate(document)
+    level = scenario.model_copy(update={"terrain": PLANE})
+    drive = "published optimum A"
+    controller, design, _ = DRIVES[drive]
+    ours, _ = our_walk(drive, scenario, DEFAULT)
+    mujocos, _ = walk_in_mujoco(DEFAULT, scenario, controller, design)
+    flat, _ = our_walk(drive, level, DEFAULT)
+    apart = np.abs(mujocos[:5] / ours[:5] - 1.0).max()
+    assert apart < 0.1
+    assert apart < 0.5 * np.abs(ours[:5] / flat[:5] - 1.0).max()

@@ -17,7 +17,7 @@ from gaitswarm.sim.mujoco.kernel import MujocoKernel, WalkStopped
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario
-from gaitswarm.sim.worlds import PERTURBATIONS, EngineWalk, WorldWalk, sample_worlds
+from gaitswarm.sim.worlds import DRAWN, EngineWalk, WorldWalk, sample_worlds
 from tests.examples.walks import UPHILL_WALK
 
 pytestmark = pytest.mark.slow
@@ -33,7 +33,7 @@ MISHAPS: Mapping[str, Mapping[str, Any]] = {
 
 
 def world_walk(scenario: Scenario, controller: ControllerName = "pi") -> WorldWalk:
-    names = tuple(variable.name for variable in PERTURBATIONS)
+    names = tuple(variable.name for variable in DRAWN)
     return WorldWalk("szabadka2", controller, tuple(PI.items()), scenario, names)
 
 
@@ -42,14 +42,14 @@ def rows(worlds: np.ndarray, *engines: float) -> np.ndarray:
     return np.array([[*world, engine] for world in worlds.tolist() for engine in engines])
 
 
-NOMINAL = np.array([[variable.default for variable in PERTURBATIONS]], dtype=np.float64)
+NOMINAL = np.array([[variable.default for variable in DRAWN]], dtype=np.float64)
 
 
 @pytest.mark.variants
 @pytest.mark.parametrize("mishap", MISHAPS)
 def test_mishaps_act_in_mujoco_as_in_the_kernel(mishap: str) -> None:
     walk = world_walk(STEP.model_copy(update=MISHAPS[mishap]))
-    found = EngineWalk(walk, len(PERTURBATIONS)).run(rows(NOMINAL, 0, 1))
+    found = EngineWalk(walk, len(DRAWN)).run(rows(NOMINAL, 0, 1))
     calm = world_walk(STEP).run(NOMINAL).objectives[0]
     ours, mujocos = found.objectives
     assert found.statuses.tolist() == [Status.OK, Status.OK]
@@ -70,7 +70,7 @@ def test_mujoco_measures_a_walk_as_the_kernel_does() -> None:
 def test_a_world_is_another_one_in_mujoco_too_but_for_our_own_engine_nothing_changes() -> None:
     """All perturbations at once: masses, soles, battery, gears, noise, delays, slope and start."""
     walk, worlds = world_walk(STEP), sample_worlds(2, 3)
-    found = EngineWalk(walk, len(PERTURBATIONS)).run(rows(worlds, 0, 1))
+    found = EngineWalk(walk, len(DRAWN)).run(rows(worlds, 0, 1))
     ours, mujocos = found.objectives[::2], found.objectives[1::2]
     assert ours.tobytes() == walk.run(worlds).objectives.tobytes()
     np.testing.assert_allclose(mujocos[:, :5], ours[:, :5], rtol=0.03)
@@ -106,7 +106,7 @@ def test_a_robot_that_falls_or_diverges_ends_so_and_leaves_no_file(
 
 
 def test_an_abandoned_walk_is_stopped() -> None:
-    case = EngineWalk(world_walk(Scenario.model_validate(UPHILL_WALK)), len(PERTURBATIONS))
+    case = EngineWalk(world_walk(Scenario.model_validate(UPHILL_WALK)), len(DRAWN))
     asked: list[bool] = []
 
     def should_stop() -> bool:

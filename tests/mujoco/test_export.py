@@ -13,6 +13,7 @@ from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.mujoco.model import exported
 from gaitswarm.sim.robot import RobotFiles, RobotVariant, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.terrain import Rough, height_grid
 from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
 from tests.examples.robots import SLOW, robot_folder
@@ -126,3 +127,19 @@ def test_a_pose_that_the_legs_do_not_reach_is_refused(
 def test_bad_input_names_the_option(options: tuple[str, ...], words: str) -> None:
     result = run_command("mjcf", *options)
     assert (result.code, words in result.err) == (2, True), result.err
+
+
+def test_the_ground_of_the_scenario_is_a_height_field_below_the_soles() -> None:
+    terrain = Rough(kind="rough", amplitude=0.02)
+    m = opened(SCENARIOS[0].model_copy(update={"terrain": terrain}))
+    d, normal, grid = mujoco.MjData(m), np.empty(3), height_grid(terrain)
+    mujoco.mj_resetDataKeyframe(m, d, m.key("start").id)
+    mujoco.mj_forward(m, d)
+    assert grid is not None
+    for place in np.array([[0.0, 0.0], [0.31, -0.2], [-0.4, 0.35]]):
+        above = np.append(place, 1.0)
+        fall = mujoco.mj_rayHfield(
+            m, d, m.geom("ground").id, above, np.array([0.0, 0.0, -1.0]), normal
+        )
+        assert 1.0 - fall == pytest.approx(float(grid.height(*place)), abs=5e-3)
+    assert d.ncon >= 3

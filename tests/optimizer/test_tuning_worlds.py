@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
-from gaitswarm.sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
+from gaitswarm.sim.worlds import DRAWN, WorldWalk, sample_worlds
 from tests.examples.jobs import history
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
@@ -148,7 +148,7 @@ def test_an_integer_perturbation_stays_one_within_custom_bounds() -> None:
 
 def test_worlds_are_all_perturbations_by_default_and_stored_with_their_bounds() -> None:
     spec = robust(ranges=None).resolved()
-    assert spec.worlds is not None and spec.worlds.ranges == PERTURBATIONS
+    assert spec.worlds is not None and spec.worlds.ranges == DRAWN
     assert SPECS.validate_json(spec.model_dump_json()) == spec
     assert JobSpec().worlds is None
 

@@ -345,7 +345,7 @@ def test_a_library_whose_structures_differ_is_refused_with_its_name(robot: Robot
         "constants": len(robot_constants(robot)),
         "size_of_coding": 88,
         "size_of_table": 64,
-        "size_of_walker": 400,
+        "size_of_walker": 576,
         "size_of_lane_use": 32,
         "size_of_call": 48,
         "size_of_pool": 24,

@@ -23,7 +23,7 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVarian
 from gaitswarm.sim.robot.identifiable import with_parameters
 from gaitswarm.sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
 from gaitswarm.sim.worlds import (
-    PERTURBATIONS,
+    DRAWN,
     MeasuredPerturbedWalk,
     PerturbedWalk,
     WorldWalk,
@@ -34,10 +34,10 @@ from tests.examples.walks import PUBLISHED_A, quadruped_files, short_walk, walk
 Floats = NDArray[np.float64]
 
 PI = {"P": 0.45, "I": 0.1}
-NAMES = tuple(variable.name for variable in PERTURBATIONS)
+NAMES = tuple(variable.name for variable in DRAWN)
 MAIN: ControllerName = "fuzzy-pi"
-NOMINAL_VALUES = {v.name: v.default for v in PERTURBATIONS if v.default is not None}
-NOMINAL = np.array([[variable.default for variable in PERTURBATIONS]])
+NOMINAL_VALUES = {v.name: v.default for v in DRAWN if v.default is not None}
+NOMINAL = np.array([[variable.default for variable in DRAWN]])
 VARIANTS: dict[str, RobotSource] = {
     "reconstructed": "szabadka2-reconstructed",
     "datasheet": "szabadka2",
@@ -227,16 +227,16 @@ def test_a_world_that_cannot_be_simulated_is_refused_by_name(
 def test_worlds_are_drawn_by_seed_and_index_and_variable() -> None:
     many, few = sample_worlds(200, seed=7), sample_worlds(20, seed=7)
     np.testing.assert_array_equal(many[:20], few)
-    low, high = (np.array([getattr(v, end) for v in PERTURBATIONS]) for end in ("low", "high"))
+    low, high = (np.array([getattr(v, end) for v in DRAWN]) for end in ("low", "high"))
     assert ((many >= low) & (many <= high)).all()
     shares = (many - low) / (high - low)
     np.testing.assert_allclose(shares.mean(axis=0), 0.5, atol=0.08)
-    even = [v.high - v.low > 2.0 or v.kind == "continuous" for v in PERTURBATIONS]
+    even = [v.high - v.low > 2.0 or v.kind == "continuous" for v in DRAWN]
     np.testing.assert_allclose(shares[:, even].std(axis=0), 12.0**-0.5, atol=0.04)
-    some = PERTURBATIONS[3:7][::-1]
+    some = DRAWN[3:7][::-1]
     np.testing.assert_array_equal(sample_worlds(20, seed=7, choice=some), few[:, 3:7][:, ::-1])
     assert not np.array_equal(few, sample_worlds(20, seed=8))
-    correlated = np.abs(np.corrcoef(many.T) - np.eye(len(PERTURBATIONS)))
+    correlated = np.abs(np.corrcoef(many.T) - np.eye(len(DRAWN)))
     assert correlated.max() < 0.3
     delays = many[:, NAMES.index("angle_delay")]
     assert np.unique(delays, return_counts=True)[1].tolist() == pytest.approx([67] * 3, abs=20)
@@ -253,7 +253,7 @@ def test_bounds_of_table_2_7_span_the_intervals_of_all_legs() -> None:
         whole = name.startswith(("battery", "body"))
         factor = f"{name if whole else name.split('_')[0]}_factor"
         spans[factor].append([end / document["parameters"][name] for end in ends])
-    bounds = {v.name: (v.low, v.high) for v in PERTURBATIONS if "table 2.7" in v.description}
+    bounds = {v.name: (v.low, v.high) for v in DRAWN if "table 2.7" in v.description}
     assert bounds.keys() == spans.keys()
     for name, (low, high) in bounds.items():
         # Rounded outwards.
@@ -265,7 +265,7 @@ def test_every_perturbation_matters() -> None:
     others = {"slope_added": 1.0, "start_angle": 0.01, "angle_noise": 1e-4}
     scenario = short_walk(load=1.0, cycle_time=0.5)
     # Two ticks are short compared with the current's low-pass.
-    values = {v.name: v.high for v in PERTURBATIONS} | {"current_delay": 15.0}
+    values = {v.name: v.high for v in DRAWN} | {"current_delay": 15.0}
     rows = [others, *(others | {name: values[name]} for name in NAMES)]
     worlds = np.array([[(NOMINAL_VALUES | row)[name] for name in NAMES] for row in rows])
     for robot in (DEFAULT_ROBOT, RobotVariant(backlash=(2.5, 1.0, 1.0))):
@@ -273,7 +273,7 @@ def test_every_perturbation_matters() -> None:
         nominal, *found = walked.run(worlds).objectives
         same = [
             v.name
-            for v, objectives in zip(PERTURBATIONS, found, strict=True)
+            for v, objectives in zip(DRAWN, found, strict=True)
             if np.allclose(objectives, nominal, rtol=1e-9)
         ]
         assert same == (["backlash_factor"] if robot == DEFAULT_ROBOT else [])

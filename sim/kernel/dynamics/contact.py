@@ -38,8 +38,9 @@ class Foot:
 
     at: Vector  # the tibia's end [m]
     up: Vector  # the ground's normal
-    ahead: Vector  # the world's x axis
-    left: Vector  # the world's y axis
+    # along the ground: the world's x and y axes, on uneven ground turned with it
+    ahead: Vector
+    left: Vector
     velocity: Vector  # of the tibia's end [m/s]
     rising: Scalar  # part of the velocity along `up` [m/s]
     normal: Scalar  # force of the ground's spring [N]
@@ -91,23 +92,38 @@ friction follows the normal force, which is not symmetric."""
 
 
 def foot_on_ground(
-    link: LinkState, at: Vector, ground: Mapping[str, Scalar], mobility: Scalar
+    link: LinkState,
+    at: Vector,
+    ground: Mapping[str, Scalar],
+    mobility: Scalar,
+    patch: tuple[Scalar, ...] = (),
 ) -> Foot:
     """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
 
     The sole's spring extends from the tibia's end, `at` in its frame [m], along the ground's
-    normal.
+    normal. `patch` is the tangent plane of uneven ground: height [m] below the tibia's end and
+    slopes along the world's x and y.
     """
     velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
-    penetration = ground["sole"] - (link.height + dot(link.up, at))
-    rising = dot(link.up, velocity)
+    up, ahead, left = link.up, link.ahead, cross(link.up, link.ahead)
+    distance = link.height + dot(up, at)
+    if patch:
+        height, along, across = patch
+        run = 1.0 + along * along
+        level, shorter = 1.0 / ca.sqrt(run + across * across), 1.0 / ca.sqrt(run)
+        tilted = subtract(up, add(scale(along, ahead), scale(across, left)))
+        ahead = scale(shorter, add(ahead, scale(along, up)))
+        distance, up = level * (distance - height), scale(level, tilted)
+        left = cross(up, ahead)
+    penetration = ground["sole"] - distance
+    rising = dot(up, velocity)
     touching = penetration > 0.0
     elastic = ground["stiffness"] * penetration - ground["damping"] * rising
     return Foot(
         at=at,
-        up=link.up,
-        ahead=link.ahead,
-        left=cross(link.up, link.ahead),
+        up=up,
+        ahead=ahead,
+        left=left,
         velocity=velocity,
         rising=rising,
         normal=ca.fmax(elastic, 0.0) * touching,

@@ -38,6 +38,7 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
     apply,
     cross,
     dot,
+    rotation_of,
     scale,
     subtract,
 )
@@ -73,6 +74,7 @@ class LimbState:
     springs: Scalars = ()  # torques of dry friction's springs [N m]
     loads: Scalars = ()  # torques passed to the links in the step before, with dry friction [N m]
     carried: Scalars = ()  # internal state of the foot's contact law
+    patch: Scalars = ()  # uneven ground under the foot, see `foot_on_ground`
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +156,7 @@ def before(
         torques[k] = torques[k] - obstacle
         armature[k] = armature[k] + half * p["jam_damping"][k]
     ground = {name: p[name][0] for name in CONTACT_LAWS[law].parameters}
-    foot = foot_on_ground(states[-1], limb.foot, ground, limb.mobility)
+    foot = foot_on_ground(states[-1], limb.foot, ground, limb.mobility, state.patch)
     reaction = FRICTION[law](foot, ground, state.carried, environment.timestep)
     resistance = _scaled(half, reaction.resistance)
     # Accelerations are relative to free fall until the end; the foot's resistance is not. A damper
@@ -169,7 +171,7 @@ def before(
         Inertia.at_point(limb.foot, resistance),
         Force(push, cross(limb.foot, push)),
     )
-    dt = environment.timestep
+    dt, tibia = environment.timestep, states[-1]
     return Before(
         inertia,
         force,
@@ -189,9 +191,9 @@ def before(
         tuple(drive.spring for drive in drives if state.springs),
         reaction.internal_state,
         (
-            dot(foot.ahead, reaction.force),
-            dot(foot.left, reaction.force),
-            dot(foot.up, reaction.force),
+            dot(tibia.ahead, reaction.force),
+            dot(cross(tibia.up, tibia.ahead), reaction.force),
+            dot(tibia.up, reaction.force),
         ),
     )
 
@@ -235,6 +237,17 @@ def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Sca
             held.height,
         ),
     )
+
+
+def place(limb: Limb, q: Sequence[Scalar], angles: Sequence[Scalar]) -> Scalars:
+    """Foot, then knee (the tibia's joint) in the world, x, y, z each [m], for a body at q (7)."""
+    foot, knee = limb.foot, (0.0, 0.0, 0.0)
+    links = _links(limb, *_turns(limb, angles), [0.0] * len(limb.joints))
+    for link in reversed(links):
+        foot = add(link.offset, link.rotation.inwards(foot))
+        knee = link.offset if link is links[-1] else add(link.offset, link.rotation.inwards(knee))
+    attitude, at = rotation_of(q[3:7]), (q[0], q[1], q[2])
+    return (*add(at, apply(attitude, foot)), *add(at, apply(attitude, knee)))
 
 
 def links_at(limb: Limb, angles: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Link]:

@@ -37,6 +37,7 @@ from gaitswarm.sim.kernel.dynamics.limb import (
     Scalars,
     after,
     before,
+    place,
 )
 from gaitswarm.sim.kernel.dynamics.spatial import Force, Scalar, add, leaves, mapped
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
@@ -92,14 +93,14 @@ class PhysicsModel:
     frame, joint rates; internal_state (I), see `parameters.internal_state_size`; duty (J): motor
     voltage per supply voltage, or torque per torque limit; disturbance (J): torque on each link [N
     m], or, with the parameter `displaced`, additional angle [rad] of its gearhead; parameters (P),
-    see `parameters.Layout`.
+    see `parameters.Layout`; on uneven ground patches (3 L), see `contact.foot_on_ground`.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, *, uneven: bool = False) -> None:
         self.layout = Layout(robot)
         self._robot = robot
         self._limbs = _limbs_by_pinocchio(robot)
-        self._symbols = _symbols(robot, self.layout)
+        self._symbols = _symbols(robot, self.layout, uneven=uneven)
 
     @cached_property
     def kick(self) -> Any:
@@ -136,6 +137,14 @@ class PhysicsModel:
         )
 
     @cached_property
+    def places(self) -> Any:
+        """q -> feet and knees in the world, (6 L): see `limb.place`."""
+        q = self._symbols.q
+        legs = [_of_limb(q[7:], k, len(self._limbs)) for k in range(len(self._limbs))]
+        placed = [place(limb, q, leg) for limb, leg in zip(self._limbs, legs, strict=True)]
+        return _function("places", self._symbols.inputs[:1], [[x for leg in placed for x in leg]])
+
+    @cached_property
     def observe(self) -> Any:
         """Current (J), voltage (J), load torque (J), foot force in the world (3 L), supply (1) and
         acceleration (6+J) as in `pinocchio.aba`, all at this instant.
@@ -160,8 +169,8 @@ class PhysicsModel:
 
 
 @lru_cache(maxsize=16)
-def physics_model(robot: Robot) -> PhysicsModel:
-    return PhysicsModel(robot)
+def physics_model(robot: Robot, *, uneven: bool = False) -> PhysicsModel:
+    return PhysicsModel(robot, uneven=uneven)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +181,7 @@ class _Symbols:
     duty: list[Scalar]
     disturbance: list[Scalar]
     p: dict[str, list[Scalar]]
+    patches: list[Scalar]
     inputs: tuple[Any, ...]
 
 
@@ -227,7 +237,7 @@ def _step(
     before_of = _ByKind(limbs, limb_before, law, *layout.by_limb)
     after_of = _ByKind(limbs, after)
     gears = motors[:n], motors[n:], springs, loads
-    parts = s.q[7:], s.v[6:], s.duty, s.disturbance, *gears, carried
+    parts = s.q[7:], s.v[6:], s.duty, s.disturbance, *gears, carried, s.patches
     befores = [
         before_of(
             k,
@@ -310,7 +320,7 @@ def _of_limb(values: Sequence[Scalar], k: int, n_limbs: int) -> tuple[Scalar, ..
     return tuple(values[k * size : (k + 1) * size])
 
 
-def _symbols(robot: Robot, layout: Layout) -> _Symbols:
+def _symbols(robot: Robot, layout: Layout, *, uneven: bool) -> _Symbols:
     n = robot.n_joints
     sizes = {
         "q": 7 + n,
@@ -320,10 +330,16 @@ def _symbols(robot: Robot, layout: Layout) -> _Symbols:
         "disturbance": n,
         "p": layout.size,
     }
+    if uneven:
+        sizes["patches"] = 3 * len(robot.legs)
     inputs = tuple(ca.SX.sym(name, size) for name, size in sizes.items())
-    q, v, internal_state, duty, disturbance, p = ([s[k] for k in range(s.numel())] for s in inputs)
+    q, v, internal_state, duty, disturbance, p, *patches = (
+        [s[k] for k in range(s.numel())] for s in inputs
+    )
     fields = {name: p[where] for name, where in layout.slices.items()}
-    return _Symbols(q, v, internal_state, duty, disturbance, fields, inputs)
+    return _Symbols(
+        q, v, internal_state, duty, disturbance, fields, [x for p in patches for x in p], inputs
+    )
 
 
 def _limbs_by_pinocchio(robot: Robot) -> tuple[Limb, ...]:

@@ -24,6 +24,10 @@ typedef struct {
 #if TORQUE
   Inner inner;
 #endif
+#if UNEVEN
+  Ground ground;
+  vec places[NL][6]; /* of feet and knees at the last step */
+#endif
   wide sums[N_INTEGRANDS];
   vec peaks[N_PEAKS], lifted[NL], clearance; /* lifted: in this cycle */
   Sensors sensors; /* the largest and rarely used: last */
@@ -67,6 +71,9 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
   s->cycle_left[k] = w->cycle;
   set_control(&s->gains, &s->past, k, &w->law);
   set_sensors(&s->sensors, k, &w->sensors);
+#if UNEVEN
+  set_ground(&s->ground, k, &w->terrain);
+#endif
   if (w->smoothing[0] < 1.0) s->filtered = 1;
   if (w->disturbance) s->disturbed = 1;
   if (w->shove[1]) s->shoved = 1;
@@ -257,6 +264,11 @@ static void drift(Lanes *s, int h, double steps)
 static void round_of_steps(Lanes *s, const Coding *c)
 {
   vec integrands[N_INTEGRANDS];
+#if UNEVEN
+  vec patches[3 * NL];
+#else
+  const vec *const patches = NULL;
+#endif
 #ifdef SINGLE
   vec q[NQ];
 #else
@@ -277,7 +289,11 @@ static void round_of_steps(Lanes *s, const Coding *c)
     for (int i = 0; i < NQ; i++)
       for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[i][h]);
 #endif
-    kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, s->shoved,
+#if UNEVEN
+    place_feet(q, c->robot, s->places);
+    patch_feet(&s->ground, s->places, patches);
+#endif
+    kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, patches, s->shoved,
          s->current, integrands, s->peaks, s->lifted, &s->landing);
     for (int h = 0; h < HALVES; h++) drift(s, h, left ? 1.0 : 0.5);
     for (int i = 0; i < N_INTEGRANDS; i++)
@@ -302,7 +318,16 @@ static int end_round(Lanes *s)
 {
   int walked = 0;
   for (int h = 0; h < HALVES; h++) {
-    const dvec qx = s->q[3][h], qy = s->q[4][h], height = s->q[2][h];
+    const dvec qx = s->q[3][h], qy = s->q[4][h];
+#if UNEVEN
+    dvec patch[3];
+    under(&s->ground, h, s->q[0][h], s->q[1][h], patch);
+    const dvec height = s->q[2][h] - patch[0];
+    const divec below = struck(&s->ground, h, s->q, s->places);
+#else
+    const dvec height = s->q[2][h];
+    const divec below = {0};
+#endif
     const dvec upright = DSPLAT(1.0) - DSPLAT(2.0) * (qx * qx + qy * qy);
     const divec sound = all_finite(s, h);
     for (int n = 0; n < DOUBLES; n++) {
@@ -314,6 +339,7 @@ static int end_round(Lanes *s)
       if (!--s->cycle_left[k]) end_cycle(s, k);
       if (!sound[n]) leave(s, k, DIVERGED);
       else if (height[n] < w->fall_height || upright[n] < w->fall_cosine) leave(s, k, FELL);
+      else if (below[n]) leave(s, k, STRUCK);
       else if (s->tick[k] == w->ticks) leave(s, k, OK);
     }
   }

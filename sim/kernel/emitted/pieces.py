@@ -24,7 +24,14 @@ from gaitswarm.sim.kernel.dynamics.body import (
 )
 from gaitswarm.sim.kernel.dynamics.drives import battery_voltage
 from gaitswarm.sim.kernel.dynamics.kinds import LimbKind, limb_kinds
-from gaitswarm.sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before
+from gaitswarm.sim.kernel.dynamics.limb import (
+    Environment,
+    Held,
+    LimbState,
+    after,
+    before,
+    place,
+)
 from gaitswarm.sim.kernel.dynamics.spatial import Force, Inertia, Motion, Scalar, leaves, mapped
 from gaitswarm.sim.kernel.emitted.emit_c import emit_c
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
@@ -44,9 +51,9 @@ _CONSTANTS: Final = "constants"
 """Name of the input shared by all walks."""
 
 
-def kernel_pieces(robot: Robot) -> str:
-    """C source of `kick` for a robot."""
-    return _Pieces(robot).text()
+def kernel_pieces(robot: Robot, *, uneven: bool = False) -> str:
+    """C source of `kick` for a robot, on uneven ground also of `place_feet`."""
+    return _Pieces(robot, uneven=uneven).text()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +65,8 @@ class _Input:
 
 
 class _Pieces:
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+    def __init__(self, robot: Robot, *, uneven: bool) -> None:
+        self._robot, self._uneven = robot, uneven
         self._n = robot.n_joints
         self._layout = Layout(robot)
         self._limbs = limbs_of(robot)
@@ -97,6 +104,7 @@ class _Pieces:
                     after_calls="\n".join(call for _, call in limb_calls),
                     copies="\n".join(self._copies()),
                 ),
+                *([self._place_feet(starts[:-1])] if self._uneven else []),
             ]
         )
 
@@ -115,6 +123,35 @@ class _Pieces:
     @property
     def _distinct(self) -> list[LimbKind]:
         return list(dict.fromkeys(self._kinds))
+
+    def _place_feet(self, starts: Sequence[int]) -> str:
+        calls, n = [], JOINTS_PER_LEG
+        text, self._text = self._text, []
+        for number, kind in enumerate(self._distinct):
+            limb = next(limb for limb, kind_of_limb in self._by_limb() if kind_of_limb == kind)
+            inputs = {
+                "q": _Input(7, "q"),
+                "angles": _Input(n, "q + 7 + 3 * l"),
+                _CONSTANTS: _Input(len(kind.numbers_of(limb)), "robot + start[l]"),
+            }
+            symbols, s = _symbols(inputs)
+            placed = place(kind.symbolic(limb, s[_CONSTANTS]), s["q"], s["angles"])
+            call = self._emit(
+                f"place_{number}", self._function(inputs, [placed], symbols), ["places[l]"]
+            )
+            calls.append(f"    case {number}: {call} break;")
+        functions, self._text = self._text, text
+        return "\n".join(
+            [
+                *functions,
+                _PLACE.format(
+                    limbs=len(self._limbs),
+                    starts=", ".join(map(str, starts)),
+                    kinds=", ".join(str(self._distinct.index(kind)) for kind in self._kinds),
+                    calls="\n".join(calls),
+                ),
+            ]
+        )
 
     def _by_limb(self) -> list[tuple[Limb, LimbKind]]:
         return list(zip(self._limbs, self._kinds, strict=True))
@@ -249,6 +286,7 @@ class _Pieces:
             "carried": _Input(
                 CONTACT_LAWS[self._law].internal_state_size, self._carried("internal")
             ),
+            **({"patch": _Input(3, "patches + 3 * l")} if self._uneven else {}),
             "timestep": timestep,
             "displaced": self._p("displaced"),
             **{name: self._p(name, size) for name, size in self._layout.by_limb.items()},
@@ -260,7 +298,7 @@ class _Pieces:
             symbolic,
             self._law,
             _body_of(s["body"]),
-            LimbState(**{f.name: s[f.name] for f in fields(LimbState)}),
+            LimbState(**{f.name: s[f.name] for f in fields(LimbState) if f.name in s}),
             Environment(s["timestep"][0], s["supply"][0], *s["displaced"]),
             {name: s[name] for name in self._layout.by_limb},
         )
@@ -352,15 +390,17 @@ def _passed_of(numbers: Sequence[Scalar]) -> tuple[Inertia, Force]:
 _KICK: Final = """\
 /* Advances velocities by a step at fixed positions; currents and integrands are those of its
    middle, which also raises peaks and, by leg, the heights to which soles were lifted. landing: 1
-   if a foot may touch down within a control tick. shoved: whether any walk's body may be pushed. */
+   if a foot may touch down within a control tick. shoved: whether any walk's body may be pushed.
+   patches: uneven ground below the feet. */
 static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec *disturbance,
-                 const vec *p, const double *robot, int shoved, vec *current, vec *integrands,
-                 vec *peaks, vec *lifted, vec *landing)
+                 const vec *p, const double *robot, const vec *patches, int shoved, vec *current,
+                 vec *integrands, vec *peaks, vec *lifted, vec *landing)
 {{
   static const int start[{limbs}] = {{ {starts} }}, kind[{limbs}] = {{ {kinds} }};
   vec body[{body}], supply, held[{limbs}][{held}], gathered[{passed}];
   vec spun[{joints}], springs[{joints}], carried[4], falling[6], of_body[5], tallies[{tallies}];
   vec total[6];
+  (void)patches;
   {before_limbs}
   if (shoved) {{
     {push_body}
@@ -389,5 +429,18 @@ static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec
   integrands[4] = of_body[2];
   for (int i = 2; i < 6; i++) integrands[3 + i] = total[i];
   for (int i = 2; i < 4; i++) peaks[i] = vec_max(peaks[i], of_body[1 + i]);
+}}
+"""
+
+_PLACE: Final = """\
+/* Feet, then knees in the world, x, y, z each [m]. */
+static void place_feet(const vec *q, const double *robot, vec (*places)[6])
+{{
+  static const int start[{limbs}] = {{ {starts} }}, kind[{limbs}] = {{ {kinds} }};
+  for (int l = 0; l < {limbs}; l++) {{
+    switch (kind[l]) {{
+{calls}
+    }}
+  }}
 }}
 """

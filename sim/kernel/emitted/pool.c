@@ -11,7 +11,7 @@
 #define N_PEAKS 4
 #define NLOG (NQ + NV + NI + 2 * NJ)
 
-enum { OK = 0, DIVERGED = 1, FELL = 2 };
+enum { OK = 0, DIVERGED = 1, FELL = 2, STRUCK = 5 };
 
 /* Inputs and results of one walk. Fields as in native.py. */
 typedef struct {
@@ -21,6 +21,7 @@ typedef struct {
   const int32_t *desired;       /* ticks x NJ, coded angles */
   const double *disturbance;    /* ticks x NJ, torque on the links [N m]; or NULL */
   const double *feed_forward;   /* ticks x NJ, torque that carries the robot [N m]; or NULL */
+  Terrain terrain;
   SensorErrors sensors;
   int64_t shove[2]; /* first tick of the push, and the tick after its last */
   Law law;

@@ -26,7 +26,9 @@ _deriving: Final = threading.Lock()
 
 
 @lru_cache(maxsize=128)
-def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
+def kernel_identity(
+    robot: Robot, precision: Precision = "double", *, uneven: bool = False
+) -> bytes:
     """Digest of everything that a kernel's source depends on, without deriving it."""
     options = (
         precision,
@@ -35,19 +37,20 @@ def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
         robot.has_backlash,
         robot.has_dry_friction,
         robot.is_torque_controlled,
+        uneven,
     )
     kinds = limb_kinds(limbs_of(robot))
     return hashlib.sha256(_generator() + repr((kinds, options)).encode()).digest()
 
 
-def kernel_source(robot: Robot, precision: Precision = "double") -> str:
+def kernel_source(robot: Robot, precision: Precision = "double", *, uneven: bool = False) -> str:
     """Derive a robot's physics and write it as C; takes some seconds."""
     # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
     from gaitswarm.sim.kernel.emitted.pieces import kernel_pieces  # noqa: PLC0415
 
     layout = Layout(robot)
     with _deriving:
-        pieces = kernel_pieces(robot)
+        pieces = kernel_pieces(robot, uneven=uneven)
     return "\n".join(
         [
             f"#define NJ {robot.n_joints}",
@@ -56,6 +59,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",
             f"#define TORQUE {int(robot.is_torque_controlled)}",
+            f"#define UNEVEN {int(uneven)}",
             f"#define TIMESTEP {layout.slices['timestep'].start}",
             f"#define PUSH {layout.slices['push'].start}",
             f"#define CONTROL_RATE {CONTROL_RATE}.0",
@@ -66,6 +70,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             control_tick(),
             _file("sensors.c"),
             _file("control.c"),
+            _file("terrain.c"),
             _file("pool.c"),
             *([_file("torque.c")] if robot.is_torque_controlled else []),
             _file("driver.c"),

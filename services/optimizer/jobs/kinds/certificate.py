@@ -38,7 +38,14 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice, ScenarioName
 from gaitswarm.sim.simulate import check_reach
 from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.sim.worlds import PERTURBATIONS, EngineWalk, WorldWalk, check_worlds, sample_worlds
+from gaitswarm.sim.worlds import (
+    DRAWN,
+    PERTURBATIONS,
+    EngineWalk,
+    WorldWalk,
+    check_worlds,
+    sample_worlds,
+)
 from gaitswarm.sim.worlds.perturbations import NOMINAL
 
 CASES: Final = 8
@@ -330,6 +337,12 @@ class CertificateSpec(WalksSpec):
         for held_out in self.held_out or ():
             if held_out not in self.case_names:
                 raise ValueError(f"held_out: {held_out!r} is not among the scenarios")
+        uneven = [s.name for s in self.resolved_scenarios() if s.terrain.kind != "plane"]
+        if uneven and "mujoco-contacts" in self.engines:
+            raise ValueError(
+                f"engines: mujoco-contacts has flat ground only, and {uneven[0]!r} has not; use"
+                " mujoco"
+            )
         check_design(self.controller, self.design)
         self.design_space()
         return self
@@ -396,7 +409,7 @@ class CertificateSpec(WalksSpec):
     def world_space(self) -> DesignSpace:
         """Return the perturbations; others are as the robot has them."""
         return DesignSpace.build(
-            optional=PERTURBATIONS, default=PERTURBATIONS, chosen=self.variables, fixed=self.fixed
+            optional=PERTURBATIONS, default=DRAWN, chosen=self.variables, fixed=self.fixed
         )
 
     def create_search(self) -> Optimizer:

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.preference import Judgement, geometric_me
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
-from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
+from gaitswarm.sim.worlds import DRAWN, PERTURBATIONS, sample_worlds
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,8 @@ class TuningWorlds(BaseModel):
         default=None,
         min_length=1,
         max_length=128,
-        description="Perturbations to draw: names, or variables with custom bounds. Default: all.",
+        description="Perturbations to draw: names, or variables with custom bounds. Default: all"
+        " but roughness.",
     )
     aggregate: Aggregate = Field(
         default="cvar",
@@ -61,7 +62,7 @@ class TuningWorlds(BaseModel):
     def variables(self) -> tuple[Variable, ...]:
         """Return the perturbations with their bounds. Raises ValueError, not once validated."""
         perturbations = {variable.name: variable for variable in PERTURBATIONS}
-        chosen = PERTURBATIONS if self.ranges is None else self.ranges
+        chosen = DRAWN if self.ranges is None else self.ranges
         variables: dict[str, Variable] = {}
         for entry in chosen:
             name = entry if isinstance(entry, str) else entry.name

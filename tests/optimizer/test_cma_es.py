@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -147,6 +148,20 @@ def test_only_the_order_of_fitness_values_counts() -> None:
     plain = designs_asked("cma-es", MIXED, mixed_bowl, 200)
     stretched = designs_asked("cma-es", MIXED, lambda x: np.exp(9.0 * mixed_bowl(x)), 200)
     np.testing.assert_array_equal(np.vstack(plain), np.vstack(stretched))
+
+
+@pytest.mark.parametrize("rescaled", [lambda f: 1e6 * f, lambda f: 1e100 * f, lambda f: f**1e-5])
+def test_restarts_do_not_depend_on_the_scale_of_fitness(
+    rescaled: Callable[[Floats], Floats],
+) -> None:
+    def height(x: Floats) -> Floats:
+        return np.abs(x[:, 0] - 0.3)
+
+    space = Space([Axis(0.0, 1.0)])
+    plain = designs_asked("cma-es", space, height, 2_000, population=6)
+    scaled = designs_asked("cma-es", space, lambda x: rescaled(height(x)), 2_000, population=6)
+    assert {6, 12} <= {len(designs) for designs in plain}
+    np.testing.assert_array_equal(np.vstack(plain), np.vstack(scaled))
 
 
 @pytest.mark.parametrize("integers", ["widened", "centred"])

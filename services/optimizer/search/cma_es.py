@@ -30,9 +30,6 @@ _RESTART: Final = 6
 
 _LARGEST_POPULATION: Final = 10_000
 
-_FLAT: Final = 1e-4
-"""Relative gain in fitness below which generations count as stagnating."""
-
 
 class CmaEsSettings(SearchSettings):
     """Settings of CMA-ES."""
@@ -198,19 +195,12 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
 def _stagnates(bests: list[float]) -> bool:
     """Return whether the latest third of the recent generations is no better than the first.
 
-    Compares best and median, as in Hansen's tutorial (2016, B.3) but over fewer generations. The
-    thirds need not be equal, because a stepped surface makes them differ.
+    Compares best and median, as in Hansen's tutorial (2016, B.3) but over fewer generations. Only
+    the order of fitness values counts.
     """
     third = len(bests) // 3
     before, after = bests[:third], bests[-third:]
-    return not any(_gains(of(before), of(after)) for of in (min, statistics.median_high))
-
-
-def _gains(before: float, after: float) -> bool:
-    """Return whether the gain exceeds the threshold."""
-    if not math.isfinite(after):
-        return False
-    return not math.isfinite(before) or before - after > _FLAT * abs(after)
+    return not any(of(after) < of(before) for of in (min, statistics.median_high))
 
 
 _REACH: Final = 2.0

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from gaitswarm import InvalidRequest
+from gaitswarm.plugins import Axis, Space
 from gaitswarm_research.compare import runs as running
 from gaitswarm_research.compare.command import PLANS
 from gaitswarm_research.compare.problems import NAMES, problem
@@ -25,6 +27,8 @@ from gaitswarm_research.compare.statistics import (
     summarize,
 )
 from gaitswarm_research.main import app
+
+Floats = NDArray[np.float64]
 
 FUNCTION = "D7C0R0I1"
 
@@ -110,6 +114,54 @@ def test_wrong_arguments_are_refused(
 ) -> None:
     with pytest.raises(InvalidRequest, match=message):
         tasks(methods, problems, repetitions=1, evaluations=evaluations)
+
+
+def test_a_rival_without_its_library_says_which_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "_version", lambda name: "" if name == "torch" else "1")
+    with pytest.raises(InvalidRequest, match=r"optuna-gp needs torch, .*\[rivals\]"):
+        running.check_method("optuna-gp")
+
+
+class Bowl:
+    """A bowl whose first variable must be 0.8 or more, evaluated 60 times."""
+
+    def __init__(self) -> None:
+        self.excess: Floats | None = None
+        self.positions = np.empty((0, 3))
+
+    def __call__(self, positions: Floats, /) -> Floats:
+        if len(self.positions) >= 60:
+            raise EOFError
+        self.positions = np.vstack([self.positions, positions])
+        self.excess = 0.8 - positions[:, :1]
+        fitness: Floats = np.square(positions - 0.5).sum(axis=1)
+        return fitness
+
+
+@pytest.mark.parametrize("name", sorted(set(RIVALS) - {NOT_LOCKED, "optuna-cma-es"}))
+def test_rivals_evaluate_the_start_first_and_use_it_if_they_can(name: str) -> None:
+    bowl, start = Bowl(), np.array([[0.9, 0.5, 3.0]])
+    space = Space([Axis(0.0, 1.0), Axis(0.0, 1.0), Axis(0.0, 5.0, "integer")])
+    with pytest.raises(EOFError):
+        RIVALS[name][0](space, 1, bowl, start)
+    np.testing.assert_allclose(bowl.positions[0], start[0])
+    if name in ("catcmawm", "cma"):
+        assert 0.7 < float(bowl.positions[1:8, 0].mean()) < 1.0
+    if name == "optuna-tpe":
+        assert (bowl.positions[40:, 0] >= 0.8).mean() > 0.5
+
+
+def test_infeasible_designs_come_after_feasible_ones_by_their_violation() -> None:
+    case = problem("constrained.A-gait")
+    far = np.where(np.arange(case.space.dimension) == 9, case.space.high, case.start)  # stride
+    designs = case.space.designs(np.vstack([case.start, far]))
+    less, more = case.fitness(designs, seed=1, first=0)
+    assert 1e3 < less < more
+    assert case.excess is not None
+    assert case.excess.shape == (2, 5)
+    assert (case.excess.max(axis=1) > 0.0).all()
+    assert case.final(case.start, np.array([less])) == np.inf
+    assert case.final(case.start, np.array([20.0])) == 20.0
 
 
 def test_methods_and_problems_of_all_presets_exist() -> None:

@@ -28,6 +28,8 @@ SUITES: Final = {"bbob": (2, 3, 5, 10, 20, 40), "bbob-mixint": (5, 10, 20, 40, 8
 class CocoProblem:
     """A function of a suite, by a name such as `bbob-mixint_f001_i01_d05`."""
 
+    excess = None
+
     def __init__(self, name: str) -> None:
         suite, function, instance, dimension = name.split("_")
         numbers = (int(part[1:]) for part in (function, instance, dimension))
@@ -43,6 +45,7 @@ class CocoProblem:
                 for j, (low, high) in enumerate(bounds)
             ]
         )
+        self.start = np.empty((0, self.space.dimension))
         self._least = float(self._problem(_minimizer(self._problem)))
         self.target: float | None = self._least + float(TARGETS[-1])
 

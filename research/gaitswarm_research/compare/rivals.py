@@ -8,10 +8,11 @@ numbers that a process shares.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +25,27 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _FAILED: Final = 1e30
+_VIOLATED: Final = 10.0
+"""Constraint of a failed evaluation, for methods that fit a model to constraints."""
 
 
-Evaluate = Callable[[Floats], Floats]
-"""(n, d) positions -> (n,) fitness, +inf for a failure; raises when the budget is spent."""
+class Evaluate(Protocol):
+    """Evaluates (n, d) positions: (n,) fitness, +inf for a failure; raises at the budget's end."""
+
+    @property
+    def excess(self) -> Floats | None:
+        """(n, c) constraints of the positions evaluated last, kept if <= 0; None without any."""
+
+    def __call__(self, positions: Floats, /) -> Floats: ...
 
 
-def pymoo_pso(space: Space, seed: int, evaluate: Evaluate) -> None:
+Rival = Callable[[Space, int, Evaluate, Floats], None]
+"""Searches a box, by a seed, from (k, d) start positions; methods without a start evaluate them
+first.
+"""
+
+
+def pymoo_pso(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by pymoo's particle swarm of 25, which adapts its weights."""
     pso = import_module("pymoo.algorithms.soo.nonconvex.pso")
     core, evaluator = (import_module(f"pymoo.core.{name}") for name in ("problem", "evaluator"))
@@ -40,6 +55,8 @@ def pymoo_pso(space: Space, seed: int, evaluate: Evaluate) -> None:
     problem = core.Problem(n_var=d, n_obj=1, xl=np.zeros(d), xu=np.ones(d))
     swarm = pso.PSO(pop_size=25)
     swarm.setup(problem, termination=termination(), seed=seed)
+    if len(start):
+        evaluate(start)
     while True:
         asked = swarm.ask()
         fitness = _told(evaluate(space.from_unit(asked.get("X"))))
@@ -47,7 +64,7 @@ def pymoo_pso(space: Space, seed: int, evaluate: Evaluate) -> None:
         swarm.tell(infills=asked)
 
 
-def scipy_de(space: Space, seed: int, evaluate: Evaluate) -> None:
+def scipy_de(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by scipy's differential evolution with a population of 25, in the variables' units.
 
     Its tolerance is 0, so that it spends its budget.
@@ -59,6 +76,8 @@ def scipy_de(space: Space, seed: int, evaluate: Evaluate) -> None:
 
     discrete = space.integer | space.categorical
     generator = np.random.default_rng(seed)
+    if len(start):
+        evaluate(start)
     while True:
         unit = qmc.LatinHypercube(space.dimension, rng=generator).random(25)
         with warnings.catch_warnings():
@@ -78,10 +97,11 @@ def scipy_de(space: Space, seed: int, evaluate: Evaluate) -> None:
             )
 
 
-def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
+def cma_es(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by the library cma with sigma 0.3, restarted with twice the offspring (IPOP).
 
-    It begins in the middle of the box. Integers are in their own units and keep a smallest step.
+    It begins at the best of the start, or in the middle of the box. Integers are in their own units
+    and keep a smallest step.
     """
     cma = import_module("cma")
     discrete = space.integer | space.categorical
@@ -89,6 +109,9 @@ def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
     high = np.where(discrete, space.high, 1.0)
     generator = np.random.default_rng(seed)
     mean, offspring = (low + high) / 2.0, 4 + int(3.0 * np.log(space.dimension))
+    if len(start):
+        best = start[np.argmin(evaluate(start))]
+        mean = np.where(discrete, best, space.to_unit(best[np.newaxis])[0])
     while True:
         options = {
             "bounds": [low.tolist(), high.tolist()],
@@ -114,10 +137,11 @@ def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
         offspring *= 2
 
 
-def catcmawm(space: Space, seed: int, evaluate: Evaluate) -> None:
+def catcmawm(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by CatCMAwM of the library cmaes, restarted with twice the population (IPOP).
 
-    Integers of two values are choices, as its documentation recommends.
+    Integers of two values are choices, as its documentation recommends. Its first mean is the best
+    of the start, its first variances as without one.
     """
     method = import_module("cmaes").CatCMAwM
     choices = space.categorical | (space.integer & (space.span < 2.0))
@@ -130,8 +154,17 @@ def catcmawm(space: Space, seed: int, evaluate: Evaluate) -> None:
         "c_space": [counts[j] for j in np.flatnonzero(choices)] or None,
     }
     population, generator = None, np.random.default_rng(seed)
+    normal = np.append(np.flatnonzero(real), np.flatnonzero(integers))
+    begin: dict[str, Floats] = {}
+    if len(start) and len(normal):
+        best = start[np.argmin(evaluate(start))]
+        scale = np.where(real, space.span, 1.0)
+        deviation = np.where(real, 1.0 / 12.0, space.span / 10.0)[normal]
+        begin = {"mean": ((best - space.low) / scale)[normal], "cov": np.diag(deviation**2)}
     while True:
-        strategy = method(**spaces, population_size=population, seed=int(generator.integers(2**31)))
+        chosen = int(generator.integers(2**31))
+        strategy = method(**spaces, **begin, population_size=population, seed=chosen)
+        begin = {}
         while choices.all() or not strategy.should_stop():
             asked = [strategy.ask() for _ in range(strategy.population_size)]
             unit = np.empty((len(asked), space.dimension))
@@ -147,26 +180,26 @@ def catcmawm(space: Space, seed: int, evaluate: Evaluate) -> None:
         population = 2 * strategy.population_size
 
 
-def optuna_tpe(space: Space, seed: int, evaluate: Evaluate) -> None:
+def optuna_tpe(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by Optuna's default, the multivariate TPE sampler, one design at a time."""
-    _study("TPESampler", {}, 1, space, seed, evaluate)
+    _study("TPESampler", {}, 1, space, seed, evaluate, start)
 
 
-def optuna_gp(space: Space, seed: int, evaluate: Evaluate) -> None:
+def optuna_gp(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by Optuna's Gaussian process sampler, one design at a time."""
-    _study("GPSampler", {}, 1, space, seed, evaluate)
+    _study("GPSampler", {}, 1, space, seed, evaluate, start)
 
 
-def optuna_cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
+def optuna_cma_es(space: Space, seed: int, evaluate: Evaluate, start: Floats) -> None:
     """Search by Optuna's CMA-ES sampler, in generations of 12.
 
     Categorical variables are drawn independently, as the sampler does.
     """
     options = {"popsize": 12, "warn_independent_sampling": False}
-    _study("CmaEsSampler", options, 12, space, seed, evaluate)
+    _study("CmaEsSampler", options, 12, space, seed, evaluate, start)
 
 
-RIVALS: Final[Mapping[str, tuple[Callable[[Space, int, Evaluate], None], str]]] = {
+RIVALS: Final[Mapping[str, tuple[Rival, str]]] = {
     "catcmawm": (catcmawm, "cmaes"),
     "cma": (cma_es, "cma"),
     "optuna-cma-es": (optuna_cma_es, "cmaes optuna"),
@@ -189,20 +222,34 @@ def _study(
     space: Space,
     seed: int,
     evaluate: Evaluate,
+    start: Floats,
 ) -> None:
-    """Search by a sampler of Optuna, in the variables' own units."""
+    """Search by a sampler of Optuna, in the variables' own units.
+
+    A failed evaluation counts as the worst of the others, to which a Gaussian process is fitted.
+    """
     optuna = import_module("optuna")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     distributions = {f"x{j}": _distribution(axis) for j, axis in enumerate(space.axes)}
+    worst = -math.inf
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
         chosen = getattr(optuna.samplers, sampler)(seed=seed, **options)
         study = optuna.create_study(sampler=chosen)
+        for design in space.designs(start).tolist():
+            study.enqueue_trial(dict(zip(distributions, design, strict=True)))
         while True:
             trials = [study.ask(distributions) for _ in range(batch)]
             designs = np.array([[t.params[name] for name in distributions] for t in trials], float)
-            fitness = _told(evaluate(space.positions(designs)))
-            for trial, value in zip(trials, fitness.tolist(), strict=True):
+            fitness = evaluate(space.positions(designs))
+            succeeded = np.isfinite(fitness)
+            worst = max(worst, fitness.max(initial=worst, where=succeeded))
+            values = np.where(succeeded, fitness, worst if math.isfinite(worst) else _FAILED)
+            excess = np.empty((batch, 0)) if evaluate.excess is None else evaluate.excess
+            rows = np.where(np.isfinite(excess), excess, _VIOLATED).tolist()
+            for trial, value, row in zip(trials, values.tolist(), rows, strict=True):
+                for k, number in enumerate(row):
+                    trial.set_constraint(f"c{k}", number)
                 study.tell(trial, value)
 
 

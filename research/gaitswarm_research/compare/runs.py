@@ -135,12 +135,13 @@ def check_method(name: str) -> None:
         remedy = "pip install './research[rivals]'"
     elif name in _views():
         remedy = _views()[name].needs or ""
-        missing = [name] if remedy else []
+        missing = ["a library"] if remedy else []
     else:
         known = ", ".join((*_views(), *RIVALS))
         raise InvalidRequest(f"unknown method {name!r}; known are {known}", field="methods")
     if missing:
-        raise InvalidRequest(f"{name} is not installed: {remedy}", field="methods")
+        needed = f"{name} needs {', '.join(missing)}, which is not installed: {remedy}"
+        raise InvalidRequest(needed, field="methods")
 
 
 @cache
@@ -207,7 +208,11 @@ class Recorder:
     to_target: float = math.nan
     improvements: list[tuple[int, float, Floats]] = field(default_factory=list)
 
-    def evaluate(self, positions: Floats) -> Floats:
+    @property
+    def excess(self) -> Floats | None:
+        return problem(self.task.problem).excess
+
+    def __call__(self, positions: Floats) -> Floats:
         case, budget = problem(self.task.problem), self.task.evaluations
         designs = case.space.designs(positions[: budget - self.done])
         fitness = case.fitness(designs, seed=self.task.seed, first=self.done)
@@ -244,14 +249,14 @@ class Recorder:
 def search(task: Task) -> Recorder:
     """Search until the budget is spent or the target reached."""
     recorder = Recorder(task)
-    space = problem(task.problem).space
+    space, start = problem(task.problem).space, problem(task.problem).start
     with suppress(_Ended):
         if task.method in RIVALS:
-            RIVALS[task.method][0](space, task.seed, recorder.evaluate)
+            RIVALS[task.method][0](space, task.seed, recorder, start)
         settings = json.loads(task.settings) if task.settings else task.method
-        method = create_search(settings, space, task.evaluations, task.seed)
+        method = create_search(settings, space, task.evaluations, task.seed, start)
         while True:
-            method.tell(recorder.evaluate(method.ask(task.evaluations - method.evaluations)))
+            method.tell(recorder(method.ask(task.evaluations - method.evaluations)))
     return recorder
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Final, Literal
 from urllib.parse import unquote
@@ -31,6 +32,9 @@ _MOST_ROBOTS: Final = 200
 
 _PACKAGES: Final = ("package", "model")
 """URL schemes whose path begins with a package."""
+
+Packages = Sequence[tuple[str | None, Path]]
+"""Folders of ROS packages by name; without a name, a folder that is or contains packages."""
 
 
 class MeshFileView(View):
@@ -111,7 +115,7 @@ def mesh_content(folders: Sequence[Path], digest: str, number: int) -> bytes:
 
 
 def copy_meshes(
-    urdf: str, folder: Path, output: Path, packages: Sequence[Path] = ()
+    urdf: str, folder: Path, output: Path, packages: Packages = ()
 ) -> tuple[list[str], dict[str, str]]:
     """Copy the meshes that a URDF names to their `own_place` next to its copy.
 
@@ -159,12 +163,35 @@ def found_mesh(name: str, places: Iterable[Path]) -> Path | str:
     return "its file was not found"
 
 
-def mesh_places(name: str, folder: Path, packages: Sequence[Path] = ()) -> Iterator[Path]:
+def package_places(name: str, folder: Path, packages: Packages = ()) -> Iterator[Path]:
+    """Yield folders of a ROS package, existing or not.
+
+    Those given by name come first; then folders that have the name, or a package.xml with it: the
+    URDF's own and those above it, those given, those of ROS_PACKAGE_PATH; and their subfolders.
+    """
+    yield from (place for given, place in packages if given == name)
+    own = folder.resolve()
+    listed = filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep))
+    above = (own, *own.parents)
+    for place in (*above, *(place for given, place in packages if not given), *map(Path, listed)):
+        if place.resolve().name == name or _package_in(place) == name:
+            yield place
+        yield place / name
+
+
+def _package_in(folder: Path) -> str | None:
+    """Name of the ROS package in a folder, if there is one."""
+    with suppress(OSError, ValueError, ET.ParseError):
+        return ET.parse(folder / "package.xml").findtext("name")  # noqa: S314 - read, not kept
+    return None
+
+
+def mesh_places(name: str, folder: Path, packages: Packages = ()) -> Iterator[Path]:
     """Yield the places of a mesh.
 
-    `package://NAME/PATH` is looked for in folders of that name: the URDF's own and those above it,
-    those given, those of ROS_PACKAGE_PATH, and their subfolders. Another path is relative
-    to the URDF's folder. A mesh found nowhere else may be a copy at its `own_place`.
+    `package://NAME/PATH` is in a folder of that package, or PATH is next to the URDF or in a folder
+    above it. Another path is relative to the URDF's folder. A mesh found nowhere else may be a copy
+    at its `own_place`.
     """
     scheme, separator, rest = name.partition("://")
     if not separator:
@@ -173,12 +200,9 @@ def mesh_places(name: str, folder: Path, packages: Sequence[Path] = ()) -> Itera
         yield Path(unquote(rest))
     elif scheme in _PACKAGES:
         package, _, path = rest.partition("/")
+        yield from (place / path for place in package_places(package, folder, packages))
         own = folder.resolve()
-        listed = filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep))
-        for place in (own, *own.parents, *packages, *map(Path, listed)):
-            if place.resolve().name == package:
-                yield place / path
-            yield place / package / path
+        yield from (place / path for place in (own, *own.parents))
     own_copy = own_place(name)
     if own_copy is not None:
         yield folder / own_copy

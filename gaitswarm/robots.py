@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.meshes import copy_meshes, found_mesh, mesh_places
+from gaitswarm.meshes import Packages, copy_meshes, found_mesh, mesh_places
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
@@ -29,7 +30,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_apart, walking_proposal
 from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.frame import Axis, Frame
-from gaitswarm.sim.proposal.legs import reach_below
+from gaitswarm.sim.proposal.legs import LegHints, reach_below
 from gaitswarm.sim.proposal.stance import walk_of_robot
 from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
 from gaitswarm.sim.robot.bounds import (
@@ -298,12 +299,19 @@ def init_robot(
     up: Axis | None = None,
     forward: Axis | None = None,
     meshes: bool = True,
-    packages: Sequence[str | os.PathLike[str]] = (),
+    packages: Packages = (),
+    locks: Mapping[str, float] = MappingProxyType({}),
+    feet: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> MadeRobot:
     """Make a robot's folder from a URDF: legs, stance, actuators and two walks are chosen.
 
     The meshes that the URDF names are copied, so that the folder can be shown wherever it goes.
     What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.
+
+    Args:
+        packages: Folders of ROS packages, or to search for them.
+        locks: Angles of joints to hold [rad], by name with wildcards.
+        feet: Ends of legs in the frame of a link there [m], (3,), by name with wildcards.
     """
     source, folder = Path(urdf), Path(output)
     check_new(folder)
@@ -311,14 +319,13 @@ def init_robot(
     chosen = (own_name(text) or source.stem) if name is None else name
     check_name(chosen)
     frame = frame_of(up, forward)
-    places = [Path(package) for package in packages]
 
     def bounds(mesh: str) -> NDArray[np.float64] | None:
-        found = found_mesh(mesh, mesh_places(mesh, source.parent, places))
+        found = found_mesh(mesh, mesh_places(mesh, source.parent, packages))
         return mesh_bounds(found) if isinstance(found, Path) else None
 
     try:
-        proposal = walking_proposal(text, chosen, actuator, frame, bounds)
+        proposal = walking_proposal(text, chosen, actuator, frame, LegHints(locks, feet, bounds))
     except RobotFileError as error:
         said = str(error).replace("robot.urdf", source.name, 1)
         raise InvalidRequest(said, field="urdf") from error
@@ -330,7 +337,7 @@ def init_robot(
             for path, content in texts.items():
                 (made / path).write_text(content, encoding="utf-8")
             if meshes:
-                copied, left_out = copy_meshes(proposal.urdf, source.parent, made, places)
+                copied, left_out = copy_meshes(proposal.urdf, source.parent, made, packages)
     return MadeRobot(chosen, proposal.notes, copied, left_out)
 
 

@@ -92,13 +92,13 @@ class Scenario(BaseModel):
     )
     radius: float = Field(
         gt=0.0,
-        le=1.0,
+        le=10.0,
         description="Lateral distance of the feet from the body's long axis [m].",
         examples=[0.16],
     )
     hip_height: float = Field(
         gt=0.0,
-        le=1.0,
+        le=10.0,
         description="Height of the coxa axes above the ground, the thesis's withers [m].",
         examples=[0.15],
     )
@@ -140,13 +140,13 @@ class Scenario(BaseModel):
     stride: float = Field(
         default=0.06,
         gt=0.0,
-        le=1.0,
+        le=10.0,
         description="Length of a foot's stroke on the ground [m].",
     )
     height: float = Field(
         default=0.043,
         ge=0.0,
-        le=0.5,
+        le=5.0,
         description="Height of the swing [m].",
     )
     duty_factor: float = Field(

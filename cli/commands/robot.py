@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.options import RobotOption, one_of
+from gaitswarm.cli.options import RobotOption, name_and_value, one_of
 from gaitswarm.cli.output import Printed, note, print_text
 from gaitswarm.cli.tables import gait_in_words
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -67,11 +69,28 @@ def init(
             help="Copy the URDF's meshes, which the page shows; simulations do not need them.",
         ),
     ] = True,
-    package_path: Annotated[
-        list[Path] | None,
+    package: Annotated[
+        list[str] | None,
         typer.Option(
-            metavar="FOLDER",
-            help="Search path of package:// meshes, before ROS_PACKAGE_PATH; repeatable.",
+            metavar="[NAME=]FOLDER",
+            help="Folder of the ROS package NAME, or of packages, for package://; before"
+            " ROS_PACKAGE_PATH; repeatable.",
+        ),
+    ] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=ANGLE",
+            help="Hold a joint at an angle [rad]; * and ? are wildcards; repeatable. Wheels, arms"
+            " and whatever belongs to no leg are held anyway.",
+        ),
+    ] = None,
+    foot: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK=X,Y,Z",
+            help="End of the leg with this last link, in the link's frame [m]; * and ? are"
+            " wildcards; repeatable [default: what the link's shapes suggest].",
         ),
     ] = None,
 ) -> Printed:
@@ -92,7 +111,18 @@ def init(
         up=None if up is None else one_of(AXES, up, "up"),
         forward=None if forward is None else one_of(AXES, forward, "forward"),
         meshes=meshes,
-        packages=package_path or [],
+        packages=[
+            (name or None, Path(folder).expanduser())
+            for name, _, folder in (entry.rpartition("=") for entry in package or [])
+        ],
+        locks={
+            joint: numbers_of(angle, 1, "lock")[0]
+            for joint, angle in (name_and_value(e, "lock", "JOINT=ANGLE") for e in lock or [])
+        },
+        feet={
+            link: numbers_of(at, 3, "foot")
+            for link, at in (name_and_value(e, "foot", "LINK=X,Y,Z") for e in foot or [])
+        },
     )
     left_out = [{"name": name, "problem": why} for name, why in created.left_out.items()]
     document = {
@@ -102,6 +132,16 @@ def init(
         "meshes": {"copied": created.copied, "left_out": left_out},
     }
     return document, _created(created, output)
+
+
+def numbers_of(text: str, count: int, option: str) -> list[float]:
+    """Return the finite numbers of a text that has so many, separated by commas."""
+    with suppress(ValueError):
+        numbers = [float(part) for part in text.split(",")]
+        if len(numbers) == count and all(map(math.isfinite, numbers)):
+            return numbers
+    wanted = "a number" if count == 1 else f"{count} numbers separated by commas"
+    raise InvalidRequest(f"{text!r} is not {wanted}", field=option)
 
 
 def _created(created: MadeRobot, folder: Path) -> Iterator[str]:
@@ -146,7 +186,7 @@ def _mesh_summary(copied: list[str], left_out: dict[str, str]) -> str:
     lines = [f"meshes: {len(copied)} of {len(copied) + len(left_out)} copied"]
     lines += [f"  left out: {name[:200]}: {why}" for name, why in list(left_out.items())[:_LISTED]]
     if len(left_out) > _LISTED:
-        lines.append(f"  and {len(left_out) - _LISTED} more; pass --package-path")
+        lines.append(f"  and {len(left_out) - _LISTED} more; pass --package NAME=FOLDER")
     return "\n".join(lines) + "\n"
 
 

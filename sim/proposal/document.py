@@ -35,14 +35,16 @@ from gaitswarm.sim.proposal.frame import (
     with_elements,
 )
 from gaitswarm.sim.proposal.legs import (
+    NO_HINTS,
     FoundLeg,
     FoundLegs,
-    MeshBounds,
+    LegHints,
     chain_leg,
     find_legs,
-    no_meshes,
 )
 from gaitswarm.sim.proposal.stance import (
+    HEIGHTS,
+    NoStance,
     Stance,
     alternating_phases,
     choose_stance,
@@ -61,15 +63,15 @@ _LOWER: Final = 0.02
 """How much lower than the farthest end another one must be, relative to the leg's length."""
 
 
-def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLegs, list[str]]:
+def stood_up(urdf: str, frame: Frame, hints: LegHints) -> tuple[str, FoundLegs, list[str]]:
     """Find the legs of a URDF and give it a frame with z up, x ahead and hips about level.
 
     A body moves by its origin: one on the ground would count as fallen from the start.
     """
     root, *others = parse_urdf(urdf).links
     text = turned(urdf, root, [root, *others], frame)
-    tree = parse_urdf(text)
-    legs_found = find_legs(tree, upright=frame != AS_IT_IS, bounds=bounds)
+    legs_found = find_legs(parse_urdf(text), upright=frame != AS_IT_IS, hints=hints)
+    tree = parse_urdf(text, legs_found.held)
     legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in legs_found.legs]
     level = float(f"{np.mean([leg.hip[2] for leg in legs]):.3g}")
     if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):
@@ -84,7 +86,7 @@ def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
     """Put ends of legs that only shapes indicate at their lowest point in the stance."""
     if not any(len(leg.end.others) for leg in found.legs):
         return found
-    tree = parse_urdf(urdf)
+    tree = parse_urdf(urdf, found.held)
     legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in found.legs]
     lowered = []
     for leg, chain, angles in zip(found.legs, legs, choose_stance(legs).angles, strict=True):
@@ -159,16 +161,18 @@ def propose_robot(
     name: str,
     actuator: ActuatorChoice = "auto",
     frame: Frame = AS_IT_IS,
-    bounds: MeshBounds = no_meshes,
+    hints: LegHints = NO_HINTS,
+    height: float = HEIGHTS[0],
 ) -> Proposal:
+    """Propose a robot whose hips stand at a share of the legs' reach."""
     with by_line(urdf):
-        urdf, found, moved = stood_up(urdf, frame, bounds)
+        urdf, found, moved = stood_up(urdf, frame, hints)
     text, feet = with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
     legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in found.legs]
     with by_line(urdf):
-        stance = choose_stance(legs)
+        stance = choose_stance(legs, height)
     standing = [
         replace(leg, stance=np.array(angles))
         for leg, angles in zip(legs, stance.angles, strict=True)
@@ -197,11 +201,11 @@ def propose_robot(
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes += [
         ACTUATOR_NOTES[kind],
-        f"feet stand {stance.height:.3g} m below the hips, at three quarters of the legs' reach",
+        f"feet stand {stance.height:.3g} m below the hips, at {height:.0%} of the legs' reach",
         f"soles are {sole.length:g} m long: {sole_note}",
         _ELSE,
     ]
-    notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
+    notes += found.notes
     made = Proposal(toml + "\n", text, job, (), tuple(unphysical(tree, urdf)))
     return made.with_guesses(notes)
 
@@ -314,10 +318,22 @@ def walking_proposal(
     name: str,
     actuator: ActuatorChoice = "auto",
     frame: Frame = AS_IT_IS,
-    bounds: MeshBounds = no_meshes,
+    hints: LegHints = NO_HINTS,
 ) -> Proposal:
-    """Propose a robot, and check that it can be used and that its legs reach."""
-    proposal = propose_robot(urdf, name, actuator, frame, bounds)
+    """Propose a robot, and check that it can be used and that its legs reach.
+
+    Stances of other heights are tried where joint limits rule out the usual one.
+    """
+    refused: NoStance | None = None
+    for height in HEIGHTS:
+        try:
+            return _walking(urdf, propose_robot(urdf, name, actuator, frame, hints, height))
+        except NoStance as error:
+            refused = refused or error
+    raise refused or NoStance
+
+
+def _walking(urdf: str, proposal: Proposal) -> Proposal:
     robot = parse_robot(proposal.toml, proposal.urdf)
     with by_line(urdf):
         fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]

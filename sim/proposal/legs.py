@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import filter as matching
+from fnmatch import fnmatchcase
 from typing import Final
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.proposal.frame import check_upright, fixed_joint
+from gaitswarm.sim.proposal.frame import check_upright
+from gaitswarm.sim.robot.bounds import LARGEST
 from gaitswarm.sim.robot.chain import Chain, chain_of
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG, Leg
 from gaitswarm.sim.robot.elements import TURNS, Joint
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import visual_meshes
-from gaitswarm.sim.robot.urdf import Solid, Urdf
+from gaitswarm.sim.robot.urdf import Solid, Urdf, parse_urdf
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +33,21 @@ if it is missing or cannot be read."""
 
 def no_meshes(_name: str) -> None:
     """Find no mesh, for a URDF without mesh files."""
+
+
+@dataclass(frozen=True, slots=True)
+class LegHints:
+    """Hints for finding legs. Names are those of the URDF, with the wildcards * and ?."""
+
+    locks: Mapping[str, float] = field(
+        default_factory=dict
+    )  # joints to hold, each at an angle [rad]
+    # ends of legs by a link at each leg's end, (3,) in that link's frame [m]
+    feet: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    bounds: MeshBounds = no_meshes
+
+
+NO_HINTS: Final = LegHints()
 
 
 _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
@@ -47,9 +65,20 @@ class LegEnd:
     others: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
 
-def end_of(urdf: Urdf, link: str, bounds: MeshBounds = no_meshes) -> LegEnd:
-    """Find a leg's end: a frame fixed to its last link, a sphere, or the end of its shapes."""
+def end_of(urdf: Urdf, link: str, hints: LegHints = NO_HINTS) -> LegEnd:
+    """Find a leg's end: a hint, a frame fixed to its last link, a sphere, the end of its shapes.
+
+    A link without any is assumed to be a rod.
+    """
     parts = [name for name, place in urdf.places.items() if place.body == link]
+    given = [
+        urdf.places[part].rotation @ np.asarray(at, dtype=np.float64) + urdf.places[part].position
+        for pattern, at in hints.feet.items()
+        for part in parts
+        if fnmatchcase(part, pattern)
+    ]
+    if given:
+        return LegEnd(given[-1])
     spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
     others = [name for name in parts if name != link]
     named = [name for name in others if _FOOT_NAME.search(name)]
@@ -65,25 +94,20 @@ def end_of(urdf: Urdf, link: str, bounds: MeshBounds = no_meshes) -> LegEnd:
         note = f"its end is the sphere of the link {link!r}"
         return LegEnd(at, sole=float(radius), notes=(note,))
     of_shapes = [end for part in parts for at, s in _solids(urdf, part) for end in _ends(at, s)]
-    ends = of_shapes or [end for part in parts for end in _mesh_ends(urdf, part, bounds)]
+    ends = of_shapes or [end for part in parts for end in _mesh_ends(urdf, part, hints.bounds)]
+    meshes = [mesh.name for part in parts for mesh in visual_meshes(urdf.links[part], {})]
     if ends:
         kind = "shape" if of_shapes else "mesh"
         note = f"its end is the lowest one of the {kind} of the link {link!r} when it stands"
         at = max(ends, key=lambda end: float(np.linalg.norm(end)))
         return LegEnd(at, notes=(note,), others=np.array(ends))
-    raise RobotFileError(_without_foot(urdf, link, parts))
-
-
-def _without_foot(urdf: Urdf, link: str, parts: Iterable[str]) -> str:
-    meshes = [mesh.name for part in parts for mesh in visual_meshes(urdf.links[part], {})]
-    lost = f", and its mesh {meshes[0]!r} was not found (`--package-path`)" if meshes else ""
-    foot = f"{link}_foot"
-    joint = fixed_joint(f"{foot}_fixed", link, foot, "0 0 -0.2")
-    example = "".join([f"<link name={quoteattr(foot)}/>", *map(str.strip, joint)])
-    return (
-        f"robot.urdf: link {link!r} has no foot{lost}: add a link at its end with a fixed"
-        f" joint at its position in the frame of {link!r} [m]: {example}"
-    )
+    lost = f", and its mesh {meshes[0]!r} was not found (`--package`)" if meshes else ""
+    remedy = f"give its position in the link's frame [m], as `--foot {link}=0,0,-0.2`"
+    end = 2.0 * urdf.bodies[link].centre
+    if not end.any():
+        raise RobotFileError(f"robot.urdf: link {link!r} has no foot{lost}: {remedy}")
+    note = f"its end is a guess, as link {link!r} has no shape{lost}: a rod from its joint through"
+    return LegEnd(end, notes=(f"{note} its centre of mass; or {remedy}",))
 
 
 def _mesh_ends(urdf: Urdf, part: str, bounds: MeshBounds) -> Iterable[Floats]:
@@ -177,6 +201,9 @@ def _difference(path: Sequence[Joint], leg: Sequence[Joint]) -> str:
     )
 
 
+_LISTED: Final = 6
+"""Names that an error lists."""
+
 _STEPS: Final = 25
 """Number of angles to try for each joint."""
 
@@ -202,15 +229,60 @@ class FoundLegs:
     legs: tuple[FoundLeg, ...]  # in the order of their first joints in the file
     # all other movable joints, each at an angle within its limits [rad]
     held: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()  # a sentence for each held joint
 
 
-def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_meshes) -> FoundLegs:
+_MOST_ALIKE: Final = 4
+"""Number of chains of more than three joints from which they count as legs, not as arms."""
+
+
+def locked_joints(urdf: Urdf, locks: Mapping[str, float]) -> dict[str, tuple[float, str]]:
+    """Return the joints to hold, with angles [rad] and reasons: given ones, wheels, surplus ones.
+
+    Surplus joints are held only where no legs of three joints are found.
+    """
+    movable = [joint.name for joint in urdf.joints if not joint.fixed]
+    held: dict[str, tuple[float, str]] = {}
+    for pattern, angle in locks.items():
+        matches = matching(movable, pattern)
+        if not matches:
+            raise RobotFileError(
+                f"robot.urdf: no movable joint {pattern!r} to lock; there are"
+                f" {', '.join(movable[:_LISTED])}{', ...' if len(movable) > _LISTED else ''}"
+            )
+        held |= dict.fromkeys(matches, (angle, ", as requested"))
+    longer = [
+        chain
+        for of_all in _chains(urdf)
+        if len(chain := [joint for joint in of_all if joint.name not in held]) > JOINTS_PER_LEG
+        and all(joint.kind in TURNS for joint in chain)
+    ]
+    for chain in longer:
+        endless = [joint.limits[1] >= LARGEST for joint in chain]
+        if len(chain) == JOINTS_PER_LEG + 1 and endless[-1] and not all(endless):
+            held[chain[-1].name] = (0.0, ", as it turns a wheel")
+    if held or any(map(_is_candidate, _chains(urdf))):
+        return held
+    counts = Counter(map(len, longer)).most_common(1)
+    for chain in longer:
+        if counts[0][1] >= _MOST_ALIKE and len(chain) == counts[0][0]:
+            for joint in chain[JOINTS_PER_LEG:]:
+                note = f", as legs have three joints; or lock others, as `--lock {chain[0].name}=0`"
+                held[joint.name] = (_held_at(joint), note)
+    return held
+
+
+def find_legs(urdf: Urdf, *, upright: bool = False, hints: LegHints = NO_HINTS) -> FoundLegs:
     """Find legs: chains of three revolute joints from the body to a foot that reaches down."""
+    movable = [joint for joint in urdf.joints if not joint.fixed]
+    locked = locked_joints(urdf, hints.locks)
+    if locked:
+        urdf = parse_urdf(urdf.text, {name: at for name, (at, _) in locked.items()})
     chains = list(_chains(urdf))
     threes = [chain for chain in chains if _is_candidate(chain)]
     if len(threes) < 2:
         raise RobotFileError(_why_none(urdf, chains))
-    found = [_leg_of(urdf, chain, bounds) for chain in threes]
+    found = [_leg_of(urdf, chain, hints) for chain in threes]
     kinematics = [chain_leg(urdf, leg.joints, leg.end.at) for leg in found]
     reached = [(leg, leg.ends(tried_angles(leg))) for leg in kinematics]
     drops = [leg.hip[2] - float(feet[:, 2].min()) for leg, feet in reached]
@@ -230,12 +302,19 @@ def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_mesh
         )
     check_look_alikes(urdf, [leg.link for leg in legs])
     owned = {name for leg in legs for name in leg.joints}
-    held = {
-        joint.name: _held_at(joint)
-        for joint in urdf.joints
-        if not joint.fixed and joint.name not in owned
-    }
-    return FoundLegs(tuple(legs), held)
+    parts = [name for name, place in urdf.places.items() if place.body in {g.link for g in legs}]
+    for pattern in hints.feet:
+        if not matching(parts, pattern):
+            raise RobotFileError(
+                f"robot.urdf: no leg ends with a link {pattern!r}, to have its foot; legs end with"
+                f" {', '.join(parts[:_LISTED])}{', ...' if len(parts) > _LISTED else ''}"
+            )
+    others = {j.name: locked.get(j.name, (_held_at(j), "")) for j in movable if j.name not in owned}
+    return FoundLegs(
+        tuple(legs),
+        {name: at for name, (at, _) in others.items()},
+        tuple(f"joint {name!r} is held at {at:g} rad{why}" for name, (at, why) in others.items()),
+    )
 
 
 def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) -> ChainLeg:
@@ -306,6 +385,7 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
         return "robot.urdf: it has no movable joint; legs need three revolute joints"
     counts = sorted({len(chain) for chain in chains})
     kinds = sorted({j.kind for chain in chains for j in chain} - TURNS)
+    long = max(chains, key=len) if counts[-1] > JOINTS_PER_LEG else ()
     chains_text = (
         f"{len(chains)} chain{'s' * (len(chains) > 1)} of {', '.join(map(str, counts))} joints"
     )
@@ -314,13 +394,14 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
     return (
         f"robot.urdf: legs need three revolute joints, but"
         f" {next(iter(urdf.links))!r} carries {chains_text}"
+        + (f"; hold surplus ones, as `--lock {long[-1].name}=0` [rad]" if long else "")
     )
 
 
-def _leg_of(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> FoundLeg:
+def _leg_of(urdf: Urdf, chain: Sequence[Joint], hints: LegHints) -> FoundLeg:
     first, second, third = (joint.name for joint in chain)
     link = chain[-1].child
-    return FoundLeg((first, second, third), link, end_of(urdf, link, bounds))
+    return FoundLeg((first, second, third), link, end_of(urdf, link, hints))
 
 
 def _held_at(joint: Joint) -> float:

@@ -24,8 +24,8 @@ from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-_HEIGHT: Final = 0.75
-"""Height of the hips in the stance, relative to stretched legs."""
+HEIGHTS: Final = (0.75, 0.7, 0.8, 0.65, 0.85, 0.6, 0.9)
+"""Heights of the hips in a stance, relative to stretched legs, in the order of trial."""
 
 _MARGIN: Final = 0.15
 """Distance from a joint's limits below which a stance is penalized [rad]."""
@@ -51,8 +51,12 @@ class Stance:
         return float(np.median(self.radii))
 
 
-def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
-    """Choose a stance: feet below or next to their hips, at three quarters of the legs' reach.
+class NoStance(RobotFileError):
+    """Joint limits rule out a stance of some height."""
+
+
+def choose_stance(legs: Sequence[ChainLeg], height: float = HEIGHTS[0]) -> Stance:
+    """Choose a stance: feet below or next to their hips, at a share of the legs' reach.
 
     Among angles that put a foot there, prefer those at which it moves freely in all directions,
     with little torque, and away from the joints' limits. All feet get one distance from the body's
@@ -61,7 +65,7 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     """
     tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)
-    ground = hips - _HEIGHT * (hips - max(float(feet[:, 2].min()) for _, feet in tried))
+    ground = hips - height * (hips - max(float(feet[:, 2].min()) for _, feet in tried))
     chosen = [_best(leg, *of, ground, hips - ground) for leg, of in zip(legs, tried, strict=True)]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))
@@ -80,10 +84,10 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
 def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: float) -> Floats:
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
-        raise RobotFileError(
+        raise NoStance(
             f"robot.urdf: joint {leg.name!r} begins a leg whose foot cannot be level"
-            f" with the others: its joint limits keep it from {height:.3f} m below the highest hip,"
-            " three quarters of all legs' reach; check these and where it is mounted"
+            f" with the others: its joint limits keep it from {height:.3f} m below the highest"
+            " hip; check these and where it is mounted"
         )
     angles = angles[near]
     feet, slopes = leg.feet(angles)
@@ -191,7 +195,7 @@ def walk_within_reach(robot: Robot, values: Mapping[str, Any]) -> tuple[dict[str
             continue
         note = f"the walk {values['name']!r} has {share:.0%} of the usual stride and lift, as legs"
         return {**values, **steps}, "" if share == 1.0 else f"{note} reach no further"
-    raise RobotFileError(_no_room(robot, refused))
+    raise NoStance(_no_room(robot, refused))
 
 
 def _no_room(robot: Robot, refused: UnreachablePose | BeyondJointLimit | None) -> str:

@@ -36,7 +36,7 @@ def by_line(text: str) -> Iterator[None]:
         message = with_line(text, str(error))
         if message == str(error):
             raise
-        raise RobotFileError(message) from (error.__cause__ or error)
+        raise type(error)(message) from (error.__cause__ or error)
 
 
 def with_line(text: str, message: str) -> str:

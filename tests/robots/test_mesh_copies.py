@@ -42,7 +42,7 @@ def test_the_folder_shows_its_meshes_wherever_it_goes(
     urdf = package / "robots" / "dog.urdf"
     urdf.write_text(named(*contents, *lost), encoding="utf-8")
     output = tmp_path / "dog"
-    command = ["robot", "init", str(urdf), "--package-path", str(tmp_path / "elsewhere"), "-o"]
+    command = ["robot", "init", str(urdf), "--package", str(tmp_path / "elsewhere"), "-o"]
     assert run([*command, str(output), "--json"]) == 0
     meshes = json.loads(capsys.readouterr().out)["meshes"]
     assert meshes["copied"] == list(contents)

@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.proposal.document import propose_robot, walking_proposal
+from gaitswarm.sim.proposal.document import propose_robot
 from gaitswarm.sim.robot import Robot, parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
 from tests.robots.test_proposal import dog
@@ -103,28 +103,24 @@ def test_simple_shapes_go_before_meshes(init: Init) -> None:
 
 
 @pytest.mark.parametrize("content", [None, "no mesh", ""], ids=["missing", "broken", "empty"])
-def test_a_missing_mesh_is_named_with_the_remedy(
-    content: str | None, init: Init, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_without_its_mesh_a_shank_is_a_rod_and_the_remedy_is_named(
+    content: str | None, init: Init, tmp_path: Path
 ) -> None:
     mesh = tmp_path / "dog_description" / "meshes" / "calf.obj"
     if content is None:
         mesh.unlink()
     else:
         mesh.write_text(content, encoding="utf-8")
-    source = tmp_path / "dog_description" / "dog.urdf"
-    source.write_text(with_mesh(f'filename="{NAME}"'), encoding="utf-8")
-    assert run(["robot", "init", str(source), "--output", str(tmp_path / "made")]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert f"'FL_calf' has no foot, and its mesh '{NAME}' was not found (`--package-path`)" in said
-    assert not (tmp_path / "made").exists()
-
-
-def test_the_element_in_the_message_is_a_foot() -> None:
-    with pytest.raises(RobotFileError, match="link 'FL_calf' has no foot: add a link") as refused:
-        propose_robot(BARE, "dog")
-    example = str(refused.value).split(": ")[-1]
-    legs = "".join(example.replace("FL_", f"{leg}_") for leg in ("FL", "FR", "RL", "RR"))
-    made = walking_proposal(BARE.replace("</robot>", f"{legs}</robot>"), "dog")
-    robot = parse_robot(made.toml, made.urdf)
-    assert robot.description.legs[0].foot == "FL_calf_foot"
+    robot, said = init(with_mesh(f'filename="{NAME}"'))
+    # Twice the way to the centre of mass.
     np.testing.assert_allclose([leg.lengths[2] for leg in robot.legs], 0.2)
+    guess = next(note for note in said if note.startswith("leg FL_hip_joint: its end is a guess"))
+    assert f"its mesh '{NAME}' was not found (`--package`)" in guess
+    assert "`--foot FL_calf=0,0,-0.2`" in guess
+
+
+def test_a_shank_without_any_hint_of_its_length_is_refused_with_the_remedy() -> None:
+    with pytest.raises(
+        RobotFileError, match=r"'FL_calf' has no foot: give .* `--foot FL_calf=0,0,-0\.2`"
+    ):
+        propose_robot(BARE.replace('<origin xyz="0 0 -0.1"/>', ""), "dog")

@@ -283,8 +283,8 @@ def test_a_design_gives_values_of_groups_by_name() -> None:
     assert (scenario.gait, scenario.stride) == ("tripod", 0.07)
     assert GAIT_CATALOGUE["stride[front]"].low == GAIT_CATALOGUE["stride"].low
     assert "fir_ms[front]" not in GAIT_CATALOGUE and "stride[]" not in GAIT_CATALOGUE
-    with pytest.raises(SimulationInputError, match=r"^stride\[front\]: must be at most 1"):
-        with_gait(level(), {"stride[front]": 7.0})
+    with pytest.raises(SimulationInputError, match=r"^stride\[front\]: must be at most 10"):
+        with_gait(level(), {"stride[front]": 70.0})
 
 
 QUICK: dict[str, Any] = {"cycle_time": 0.3, "cycles": 5, "height": 0.05, "fir_ms": 4}

@@ -102,8 +102,8 @@ pictures: setup-dev ## Redraw the pictures in docs/images: the page's, two walks
 
 lock: ## Update the lock files after a change of the dependencies in pyproject.toml (needs uv).
 	$(COMPILE) pyproject.toml --extra postgres --group build -o requirements/run.lock
-	$(COMPILE) pyproject.toml --extra postgres --extra mujoco --extra mcap --group dev --group research -c requirements/run.lock -o requirements/dev.lock
-	$(COMPILE) pyproject.toml --extra postgres --extra mujoco --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
+	$(COMPILE) pyproject.toml --extra postgres --extra mujoco --extra mcap --extra xacro --group dev --group research -c requirements/run.lock -o requirements/dev.lock
+	$(COMPILE) pyproject.toml --extra postgres --extra mujoco --extra xacro --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
 	sed -n 's/^compiler = \["\(.*\)"\]/\1/p' pyproject.toml | $(COMPILE) - -o requirements/compiler.lock
 	$(COMPILE) --group manual -c requirements/dev.lock -o requirements/manual.lock
 	$(COMPILE) --group node -o requirements/node.lock

@@ -1,4 +1,4 @@
-"""Robots of one's own, made from a URDF."""
+"""Robots of one's own, made from a URDF, xacro or MJCF."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.meshes import Packages, copy_meshes, found_mesh, mesh_places
+from gaitswarm.meshes import Packages, copy_meshes, found_mesh, mesh_places, package_places
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
@@ -29,6 +29,7 @@ from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_apart, walking_proposal
 from gaitswarm.sim.proposal.drive import ActuatorChoice
+from gaitswarm.sim.proposal.formats import as_urdf
 from gaitswarm.sim.proposal.frame import Axis, Frame
 from gaitswarm.sim.proposal.legs import LegHints, reach_below
 from gaitswarm.sim.proposal.stance import walk_of_robot
@@ -300,18 +301,24 @@ def init_robot(
     forward: Axis | None = None,
     meshes: bool = True,
     packages: Packages = (),
+    arguments: Mapping[str, str] = MappingProxyType({}),
     locks: Mapping[str, float] = MappingProxyType({}),
     feet: Mapping[str, Sequence[float]] = MappingProxyType({}),
+    mass: float | None = None,
 ) -> MadeRobot:
-    """Make a robot's folder from a URDF: legs, stance, actuators and two walks are chosen.
+    """Make a robot's folder from a URDF, xacro or MJCF file.
+
+    Legs, stance, actuators and two walks are chosen.
 
     The meshes that the URDF names are copied, so that the folder can be shown wherever it goes.
     What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.
 
     Args:
         packages: Folders of ROS packages, or to search for them.
+        arguments: Values of a xacro file's arguments.
         locks: Angles of joints to hold [rad], by name with wildcards.
         feet: Ends of legs in the frame of a link there [m], (3,), by name with wildcards.
+        mass: Of the robot [kg]; default: the file's, unless it is a placeholder.
     """
     source, folder = Path(urdf), Path(output)
     check_new(folder)
@@ -324,11 +331,24 @@ def init_robot(
         found = found_mesh(mesh, mesh_places(mesh, source.parent, packages))
         return mesh_bounds(found) if isinstance(found, Path) else None
 
+    def package_folder(package: str) -> str:
+        for place in package_places(package, source.parent, packages):
+            if place.is_dir():
+                return str(place)
+        raise RobotFileError(
+            f"package {package!r} was not found; give its folder: `--package {package}=FOLDER`"
+        )
+
+    file = source.name
     try:
-        proposal = walking_proposal(text, chosen, actuator, frame, LegHints(locks, feet, bounds))
+        urdf_text, left_out_parts = as_urdf(text, source, package_folder, arguments)
+        if urdf_text is not text:
+            file = f"{file} as a URDF"
+        hints = LegHints(locks, feet, bounds, mass)
+        proposal = walking_proposal(urdf_text, chosen, actuator, frame, hints)
+        proposal = proposal.with_guesses(left_out_parts)
     except RobotFileError as error:
-        said = str(error).replace("robot.urdf", source.name, 1)
-        raise InvalidRequest(said, field="urdf") from error
+        raise InvalidRequest(str(error).replace("robot.urdf", file, 1), field="urdf") from error
     with simulation_errors("urdf"):
         job = json.dumps(proposal.job, indent=2) + "\n"
         texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
@@ -366,12 +386,13 @@ def check_name(name: str) -> None:
 
 
 def own_name(urdf: str) -> str | None:
-    """Name of the robot in a URDF."""
+    """Name of the robot in a URDF, xacro or MJCF text."""
     try:
         check_urdf(urdf)
     except RobotFileError:
         return None
-    name = ET.fromstring(urdf).get("name", "").strip()  # noqa: S314 - it has kept all bounds
+    root = ET.fromstring(urdf)  # noqa: S314 - it has kept all bounds
+    name = root.get("name", root.get("model", "")).strip()
     return name if _NAME.fullmatch(name) and name.isprintable() else None
 
 
@@ -413,20 +434,21 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
 
 class RobotDraftRequest(Request):
-    """A URDF to make a robot from."""
+    """A URDF, xacro or MJCF text to make a robot from."""
 
     name: str | None = Field(
         default=None,
         min_length=1,
         max_length=LONGEST_NAME,
         description="Of the robot: begins with a letter or digit, and has no / and no \\; null for"
-        " that which the URDF has, or `robot`.",
+        " that which the text has, or `robot`.",
         examples=["a1"],
     )
     urdf: str = Field(
         max_length=LONGEST_URDF,
-        description=f"Text of its URDF: {MOST_LINKS} links and as many joints at most,"
-        f" {MOST_ELEMENTS} elements at most, no document type.",
+        description="Text of its URDF, or xacro or MJCF that needs no other file:"
+        f" {MOST_LINKS} links and as many joints at most, {MOST_ELEMENTS} elements at most, no"
+        " document type.",
     )
     actuator: ActuatorChoice = Field(
         default="auto",
@@ -444,6 +466,27 @@ class RobotDraftRequest(Request):
         " with a warning if the legs speak against it.",
     )
 
+    locks: dict[str, float] = Field(
+        default_factory=dict,
+        max_length=MOST_LINKS,
+        description="Joints to hold, each at an angle [rad], by name with the wildcards * and ?;"
+        " wheels, arms and whatever belongs to no leg are held anyway.",
+        examples=[{"*_wheel_joint": 0.0}],
+    )
+    feet: dict[str, tuple[float, float, float]] = Field(
+        default_factory=dict,
+        max_length=MOST_LINKS,
+        description="Ends of legs, each in the frame of a link there [m], by the link's name with"
+        " wildcards; others are where the links' shapes suggest.",
+        examples=[{"FL_calf": [0.0, 0.0, -0.2]}],
+    )
+    mass: float | None = Field(
+        default=None,
+        gt=0.0,
+        le=10_000.0,
+        description="Mass of the robot [kg]; null for the text's, unless that is a placeholder.",
+    )
+
 
 class RobotDraftView(View):
     """A robot's files as `gaitswarm robot init` writes them; nothing is stored."""
@@ -451,8 +494,8 @@ class RobotDraftView(View):
     name: str = Field(description="Of the robot.", examples=["a1"])
     toml: str = Field(description="Text of robot.toml, with a comment on every guess.")
     urdf: str = Field(
-        description="Text of robot.urdf: as it was sent, with a frame at the end of every leg whose"
-        " foot is no link."
+        description="Text of robot.urdf: as it was sent or converted, with a frame at the end of"
+        " every leg whose foot is no link."
     )
     job: dict[str, Any] = Field(
         description="Fields of a job of this robot, unless it says otherwise: two scenarios, the"
@@ -467,7 +510,8 @@ def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
     check_name(name)
     frame = frame_of(request.up, request.forward)
     with simulation_errors("urdf"):
-        made = propose_apart(request.urdf, name, request.actuator, frame)
+        hints = LegHints(request.locks, request.feet, mass=request.mass)
+        made = propose_apart(request.urdf, name, request.actuator, frame, hints)
     return RobotDraftView(
         name=name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.notes)
     )

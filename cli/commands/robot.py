@@ -30,7 +30,9 @@ Folder = Annotated[
 
 
 def init(
-    urdf: Annotated[Path, typer.Argument(metavar="FILE.urdf", help="URDF of a legged robot.")],
+    urdf: Annotated[
+        Path, typer.Argument(metavar="FILE", help="URDF, xacro or MJCF of a legged robot.")
+    ],
     *,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FOLDER", help="New or empty folder.")
@@ -73,9 +75,13 @@ def init(
         list[str] | None,
         typer.Option(
             metavar="[NAME=]FOLDER",
-            help="Folder of the ROS package NAME, or of packages, for package://; before"
-            " ROS_PACKAGE_PATH; repeatable.",
+            help="Folder of the ROS package NAME, or of packages, for package:// and $(find);"
+            " before ROS_PACKAGE_PATH; repeatable.",
         ),
+    ] = None,
+    arg: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Argument of a xacro file; repeatable."),
     ] = None,
     lock: Annotated[
         list[str] | None,
@@ -93,11 +99,19 @@ def init(
             " wildcards; repeatable [default: what the link's shapes suggest].",
         ),
     ] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            help="Mass of the robot [kg], to which all masses are scaled [default: the file's].",
+        ),
+    ] = None,
 ) -> Printed:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
 
     It contains robot.toml, with a comment on every guess; robot.urdf and its meshes; and job.json,
-    the defaults of this robot's jobs. Then pass --robot FOLDER to any command.
+    the defaults of this robot's jobs. Then pass --robot FOLDER to any command. xacro needs
+    pip install 'gaitswarm[xacro]', MJCF 'gaitswarm[mujoco]'.
     """
     from gaitswarm.robots import init_robot
     from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
@@ -115,6 +129,7 @@ def init(
             (name or None, Path(folder).expanduser())
             for name, _, folder in (entry.rpartition("=") for entry in package or [])
         ],
+        arguments=dict(name_and_value(entry, "arg") for entry in arg or []),
         locks={
             joint: numbers_of(angle, 1, "lock")[0]
             for joint, angle in (name_and_value(e, "lock", "JOINT=ANGLE") for e in lock or [])
@@ -123,6 +138,7 @@ def init(
             link: numbers_of(at, 3, "foot")
             for link, at in (name_and_value(e, "foot", "LINK=X,Y,Z") for e in foot or [])
         },
+        mass=mass,
     )
     left_out = [{"name": name, "problem": why} for name, why in created.left_out.items()]
     document = {

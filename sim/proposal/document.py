@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import takewhile
 from typing import Any, Final
+from xml.etree import ElementTree as ET
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -26,6 +28,7 @@ from gaitswarm.sim.proposal.drive import (
     proposed_control,
     quoted,
 )
+from gaitswarm.sim.proposal.formats import as_urdf
 from gaitswarm.sim.proposal.frame import (
     AS_IT_IS,
     Frame,
@@ -54,7 +57,7 @@ from gaitswarm.sim.proposal.stance import (
 from gaitswarm.sim.robot.bounds import check_urdf
 from gaitswarm.sim.robot.elements import by_line
 from gaitswarm.sim.robot.robot import parse_robot
-from gaitswarm.sim.robot.urdf import parse_urdf, unphysical
+from gaitswarm.sim.robot.urdf import parse_urdf, possible, unphysical
 
 _LEVEL: Final = 0.2
 """Accepted height of hips above or below the body's origin, relative to the legs' length."""
@@ -110,6 +113,41 @@ def with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
                 *fixed_joint(f"{foot}_fixed", leg.link, foot, at),
             ]
     return with_elements(urdf, lines) if lines else urdf, feet
+
+
+_AIR, _DENSITY = 1.2, 150.0
+"""Mass of a robot by the cube of its legs' length [kg/m3]: below the first one it would fly; the
+second one is usual."""
+
+_NO_MASS: Final = (
+    "its masses are placeholders, {:.2g} kg in all: {:g} kg is a guess by its size; give it as"
+    " `--mass`"
+)
+
+_WATER: Final = 1000.0
+"""Density of a ball in place of an impossible inertia [kg/m3]."""
+
+
+def with_mass(urdf: str, mass: float) -> str:
+    """Scale all masses of a URDF to a sum [kg]; links of impossible inertia become balls."""
+    tree = parse_urdf(urdf)
+    root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
+    share = mass / tree.total_mass
+    for link in root.findall("link"):
+        part = tree.links[link.get("name", "")].inertia
+        inertial = link.find("inertial")
+        if inertial is None or not part.mass:
+            continue
+        scaled = part.mass * share
+        ball = 0.4 * scaled * (3.0 * scaled / (4.0 * math.pi * _WATER)) ** (2.0 / 3.0)
+        for element in inertial.findall("mass"):
+            element.set("value", repr(scaled))
+        for element in inertial.findall("inertia"):
+            for name, value in element.items():
+                moment = ball if name in ("ixx", "iyy", "izz") else 0.0
+                number = float(value) * share if possible(part) else moment
+                element.set(name, repr(number))
+    return ET.tostring(root, encoding="unicode")
 
 
 _PREFERENCE: Final = "C"
@@ -171,6 +209,14 @@ def propose_robot(
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
     legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in found.legs]
+    size = max(sum(leg.lengths) for leg in legs) ** 3
+    mass = hints.mass
+    if mass is None and tree.total_mass < _AIR * size:
+        mass = float(f"{_DENSITY * size:.2g}")
+        moved = [*moved, _NO_MASS.format(tree.total_mass, mass)]
+    if mass is not None:
+        text = with_mass(text, mass)
+        tree = parse_urdf(text, found.held)
     with by_line(urdf):
         stance = choose_stance(legs, height)
     standing = [
@@ -206,7 +252,7 @@ def propose_robot(
         _ELSE,
     ]
     notes += found.notes
-    made = Proposal(toml + "\n", text, job, (), tuple(unphysical(tree, urdf)))
+    made = Proposal(toml + "\n", text, job, (), tuple(unphysical(tree, text)))
     return made.with_guesses(notes)
 
 
@@ -344,14 +390,26 @@ def _walking(urdf: str, proposal: Proposal) -> Proposal:
 
 
 def propose_apart(
-    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+    text: str,
+    name: str,
+    actuator: ActuatorChoice = "auto",
+    frame: Frame = AS_IT_IS,
+    hints: LegHints = NO_HINTS,
 ) -> Proposal:
-    """Propose a robot in another process with limits of time, processor and memory."""
-    check_urdf(urdf)
+    """Propose a robot in another process with limits of time, processor and memory.
+
+    Args:
+        text: URDF, xacro or MJCF.
+        name: Of the robot.
+        actuator: Kind of actuators.
+        frame: Axes of the first link.
+        hints: For finding legs; there are no meshes.
+    """
+    check_urdf(text)
+    request = {"text": text, "name": name, "actuator": actuator, "frame": asdict(frame)}
+    guidance = {"locks": dict(hints.locks), "feet": dict(hints.feet), "mass": hints.mass}
     try:
-        made = PROCESSES.ask(
-            {"urdf": urdf, "name": name, "actuator": actuator, "frame": asdict(frame)}
-        )
+        made = PROCESSES.ask(request | guidance)
     except ProcessEnded as error:
         raise RobotFileError(
             f"robot.urdf: cannot propose a robot.toml: this {error}; write one by hand, as"
@@ -365,10 +423,15 @@ def propose_apart(
 
 
 def _answer(request: Document) -> Document:
+    urdf, left_out = as_urdf(request["text"])
     made = walking_proposal(
-        request["urdf"], request["name"], request["actuator"], Frame(**request["frame"])
+        urdf,
+        request["name"],
+        request["actuator"],
+        Frame(**request["frame"]),
+        LegHints(request["locks"], request["feet"], mass=request["mass"]),
     )
-    return asdict(made)
+    return asdict(made.with_guesses(left_out))
 
 
 if __name__ == "__main__":

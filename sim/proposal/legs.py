@@ -37,7 +37,7 @@ def no_meshes(_name: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class LegHints:
-    """Hints for finding legs. Names are those of the URDF, with the wildcards * and ?."""
+    """Hints about a robot. Names are those of the URDF, with the wildcards * and ?."""
 
     locks: Mapping[str, float] = field(
         default_factory=dict
@@ -45,12 +45,13 @@ class LegHints:
     # ends of legs by a link at each leg's end, (3,) in that link's frame [m]
     feet: Mapping[str, Sequence[float]] = field(default_factory=dict)
     bounds: MeshBounds = no_meshes
+    mass: float | None = None  # of the robot [kg]; None: the URDF's, unless it is impossible
 
 
 NO_HINTS: Final = LegHints()
 
 
-_FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
+FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +82,7 @@ def end_of(urdf: Urdf, link: str, hints: LegHints = NO_HINTS) -> LegEnd:
         return LegEnd(given[-1])
     spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
     others = [name for name in parts if name != link]
-    named = [name for name in others if _FOOT_NAME.search(name)]
+    named = [name for name in others if FOOT_NAME.search(name)]
     if others:
         far = max(named or others, key=lambda n: float(np.linalg.norm(urdf.places[n].position)))
         at = urdf.places[far].position
@@ -103,11 +104,19 @@ def end_of(urdf: Urdf, link: str, hints: LegHints = NO_HINTS) -> LegEnd:
         return LegEnd(at, notes=(note,), others=np.array(ends))
     lost = f", and its mesh {meshes[0]!r} was not found (`--package`)" if meshes else ""
     remedy = f"give its position in the link's frame [m], as `--foot {link}=0,0,-0.2`"
-    end = 2.0 * urdf.bodies[link].centre
-    if not end.any():
+    guess = f"its end is a guess, as link {link!r} has no shape{lost}"
+    rod = 2.0 * urdf.bodies[link].centre
+    if rod.any():
+        note = f"{guess}: a rod from its joint through its centre of mass; or {remedy}"
+        return LegEnd(rod, notes=(note,))
+    joint = next(joint for joint in urdf.joints if joint.child == link)
+    before = joint.origin.matrix().T @ joint.origin.xyz
+    straight = before - (before @ joint.axis) * joint.axis
+    if not straight.any():
         raise RobotFileError(f"robot.urdf: link {link!r} has no foot{lost}: {remedy}")
-    note = f"its end is a guess, as link {link!r} has no shape{lost}: a rod from its joint through"
-    return LegEnd(end, notes=(f"{note} its centre of mass; or {remedy}",))
+    aside = np.cross(joint.axis, straight)
+    note = f"{guess}: as long as the link before it; or {remedy}"
+    return LegEnd(straight, notes=(note,), others=np.array([straight, aside, -aside]))
 
 
 def _mesh_ends(urdf: Urdf, part: str, bounds: MeshBounds) -> Iterable[Floats]:

@@ -263,7 +263,7 @@ _NONE: Final = 1e-9
 
 
 def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
-    """Yield warnings about masses and inertias that are physically impossible.
+    """Yield warnings about masses and inertias that are physically impossible, one for equal ones.
 
     Links that are fixed to one another are simulated as one body: placeholder moments of a camera
     do not matter on a trunk with its own. If the whole is impossible, its impossible
@@ -272,6 +272,7 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
     parts: dict[str, list[str]] = {name: [] for name in urdf.bodies}
     for link, place in urdf.places.items():
         parts[place.body].append(link)
+    found: dict[str, list[str]] = {}
     for name, body in urdf.bodies.items():
         if body.mass == 0.0:
             problem = (
@@ -280,21 +281,24 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
             )
             yield with_line(text, f"robot.urdf: {problem}")
             continue
-        if _possible(body):
+        if possible(body):
             continue
         inertias = ((link, urdf.links[link].inertia) for link in parts[name])
-        wrong = {link: of for link, of in inertias if of.mass and not _possible(of)}
+        wrong = {link: of for link, of in inertias if of.mass and not possible(of)}
         for link, inertia in (wrong or {name: body}).items():
             moments = ", ".join(f"{moment:.3g}" for moment in _moments(inertia))
             problem = (
-                f"link {link!r}: a body of {inertia.mass:g} kg cannot have the principal moments"
-                f" {moments} kg m2: each must be positive and at most the sum of the others; check"
-                " its <inertia>"
+                f"a body of {inertia.mass:g} kg cannot have the principal moments {moments} kg m2:"
+                " each must be positive and at most the sum of the others; check its <inertia>"
             )
-            yield with_line(text, f"robot.urdf: {problem}")
+            found.setdefault(problem, []).append(link)
+    for problem, (first, *others) in found.items():
+        more = f" and {len(others)} others" if others else ""
+        yield with_line(text, f"robot.urdf: link {first!r}{more}: {problem}")
 
 
-def _possible(inertia: BodyInertia) -> bool:
+def possible(inertia: BodyInertia) -> bool:
+    """Whether a body can have such moments of inertia."""
     least, middle, largest = _moments(inertia)
     return bool(least > _NONE * largest and largest <= (least + middle) * (1.0 + _ROUNDED))
 

@@ -11,7 +11,9 @@ from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.limited_process import LimitedProcesses
 from gaitswarm.sim.proposal import document
 from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.robot import parse_robot
 from tests.examples.hostile import chain
+from tests.robots.test_formats import ALONE, DOG, MJCF
 from tests.robots.test_proposal import STATUE, dog
 
 pytestmark = pytest.mark.slow
@@ -64,6 +66,17 @@ def test_a_robot_that_faces_y_is_turned_when_that_is_said(client: httpx2.Client)
     assert feet[1] == pytest.approx(straight, abs=1e-3) != feet[0]
 
 
+@pytest.mark.parametrize(("text", "name"), [(ALONE, "dog"), (MJCF, "cat")], ids=["xacro", "mjcf"])
+def test_xacro_and_mjcf_become_robots_too(client: httpx2.Client, text: str, name: str) -> None:
+    body = {"urdf": text, "feet": {"FL_calf": [0.0, 0.0, -0.21]}, "mass": 9.0}
+    draft = client.post("/v1/robots/drafts", json=body).json()
+    assert draft["name"] == name
+    robot = parse_robot(draft["toml"], draft["urdf"])
+    assert robot.mass == pytest.approx(9.0)
+    lengths = [leg.lengths[2] for leg in robot.legs]
+    assert lengths[0] > lengths[1] == pytest.approx(lengths[2])
+
+
 def test_what_no_body_has_is_reported_by_a_check(client: httpx2.Client) -> None:
     made = propose_robot(dog().replace('ixx="1e-3"', 'ixx="1e-2"'), "dog")
     found = client.post("/v1/robots/checks", json={"toml": made.toml, "urdf": made.urdf}).json()
@@ -78,6 +91,10 @@ def test_what_no_body_has_is_reported_by_a_check(client: httpx2.Client) -> None:
         ({"urdf": chain(4500)}, "urdf", "more than 256 links"),
         ({"urdf": STATUE}, "urdf", "no movable joint"),
         ({"urdf": dog(joints=2)}, "urdf", "three revolute joints"),
+        ({"urdf": DOG}, "urdf", "<xacro:include> needs other files; convert it next to them"),
+        ({"locks": {"tail": 0.0}}, "urdf", "no movable joint 'tail' to lock"),
+        ({"feet": {"tail": [0.0, 0.0, "x"]}}, "feet.tail.2", "must be a number"),
+        ({"mass": 0.0}, "mass", "greater than 0"),
         ({"urdf": dog().replace("-2.7", "-120")}, "urdf", "in degrees"),
         ({"urdf": "x" * 800_001}, "urdf", "800000 characters"),
         ({"name": "../dog"}, "name", "cannot name a robot"),
@@ -87,7 +104,7 @@ def test_what_no_body_has_is_reported_by_a_check(client: httpx2.Client) -> None:
     ],
 )
 def test_a_draft_is_refused_by_field_with_the_way_out(
-    client: httpx2.Client, change: dict[str, str], field: str, said: str
+    client: httpx2.Client, change: dict[str, Any], field: str, said: str
 ) -> None:
     error = refused(client, "drafts", **{"name": "dog", "urdf": dog(), **change})
     assert error["field"] == field
@@ -107,7 +124,7 @@ def test_a_robot_that_is_larger_than_walks_may_be_is_refused(client: httpx2.Clie
     error = refused(client, "checks", toml=made.toml, urdf=tall)
     assert "robot.toml: a walk of this robot has a hip_height of" in error["message"]
     giant = dog().replace("0 0 -0.2", "0 0 -20")
-    error = refused(client, "drafts", name="dog", urdf=giant)
+    error = refused(client, "drafts", name="dog", urdf=giant, mass=11.6)
     assert "should be less than or equal to 10; lengths are in metres" in error["message"]
 
 
@@ -119,7 +136,7 @@ def test_a_proposal_that_takes_too_much_is_ended(
     )
     monkeypatch.setattr(document, "PROCESSES", processes)
     with pytest.raises(ProcessEnded):
-        processes.ask({"urdf": dog(), "name": "dog", "actuator": "auto"})
+        processes.ask({"text": dog(), "name": "dog", "actuator": "auto"})
     error = refused(client, "drafts", name="dog", urdf=dog())
     assert error["field"] == "urdf" and "took more than 0.01 s; write one" in error["message"]
     processes.close()

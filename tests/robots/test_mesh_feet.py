@@ -119,8 +119,16 @@ def test_without_its_mesh_a_shank_is_a_rod_and_the_remedy_is_named(
     assert "`--foot FL_calf=0,0,-0.2`" in guess
 
 
-def test_a_shank_without_any_hint_of_its_length_is_refused_with_the_remedy() -> None:
+def test_a_shank_without_a_centre_of_mass_is_as_long_as_the_link_before_it() -> None:
+    point = BARE.replace('<origin xyz="0 0 -0.1"/>', "")
+    made = propose_robot(point, "dog")
+    assert any("as long as the link before it" in guess for guess in made.guesses)
+    robot = parse_robot(made.toml, made.urdf)
+    np.testing.assert_allclose([leg.lengths[2] for leg in robot.legs], 0.2)
+    assert all(leg.foot((0.0, 0.0, 0.0))[2] == pytest.approx(-0.4) for leg in robot.legs)
+
+    joined = point.replace('<origin xyz="0 0 -0.2"/>', '<origin xyz="0 0 0"/>')
     with pytest.raises(
         RobotFileError, match=r"'FL_calf' has no foot: give .* `--foot FL_calf=0,0,-0\.2`"
     ):
-        propose_robot(BARE.replace('<origin xyz="0 0 -0.1"/>', ""), "dog")
+        propose_robot(joined, "dog")

@@ -87,7 +87,7 @@ def test_a_urdf_is_simulated_and_submitted(
 
     page = visit(server.url, allowed="422").go("/jobs/new")
     page.get_by_role("link", name="a custom robot").click()
-    urdf = page.get_by_label("URDF", exact=True)
+    urdf = page.get_by_label("URDF, xacro or MJCF")
     urdf.set_input_files(file("broken.urdf", dog().replace("-2.7", "-120")))
     error = page.get_by_role("alert").filter(has_text="Could not create a robot from broken.urdf.")
     expect(error).to_contain_text(re.compile("urdf: .*line .*in degrees"))

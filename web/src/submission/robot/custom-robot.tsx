@@ -1,4 +1,4 @@
-/** Custom robot from a URDF; guessed settings are shown and can be edited. */
+/** Custom robot from a URDF, xacro or MJCF file; guessed settings are shown and can be edited. */
 
 import { NOT_PUBLISHED } from '../../api/jobs'
 import type { CheckedLeg, RobotCheck } from '../../api/types'
@@ -34,8 +34,8 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
     <>
       <div class="fields">
         <FileField
-          label="URDF"
-          accept=".urdf,.xml"
+          label="URDF, xacro or MJCF"
+          accept=".urdf,.xacro,.xml,.mjcf"
           hint={state.urdf?.name ?? 'from the job'}
           error={robot.urdf === '' ? 'required' : undefined}
           onFile={state.chooseUrdf}
@@ -61,15 +61,16 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
         />
       </div>
       <p class="muted small">
-        2 to 32 legs with three revolute joints each. Meshes are not needed. Nothing is stored
-        before the job is submitted. {NOT_PUBLISHED}
+        2 to 32 legs with three revolute joints each; wheels, arms and surplus joints are held.
+        Meshes are not needed; a file that includes others needs <code>gaitswarm robot init</code>.
+        Nothing is stored before the job is submitted. {NOT_PUBLISHED}
       </p>
       {state.problem && (
         <>
           <ErrorNotice {...state.problem} />
           <p class="small">
-            Choose another URDF, provide a robot.toml, or edit the one below and check again.{' '}
-            {manual && <a href="/manual/docs/robots.html">Requirements for robots</a>}
+            Choose another file, provide a robot.toml, or edit the one below and check again.{' '}
+            {manual && <a href="/manual/docs/robot-errors.html">Errors and remedies</a>}
           </p>
         </>
       )}

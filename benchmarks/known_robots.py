@@ -1,11 +1,12 @@
-"""From a URDF to a tuned walk: other people's quadrupeds, in the commands that users run.
+"""From a robot's file to a tuned walk: other people's robots, in the commands that users run.
 
     python -m benchmarks.known_robots [ROBOT ...] [--iterations 20] [--particles 25] [--seed 1]
         [--evaluator in-process] [--json]
 
-`gaitswarm robot init` makes each robot of its URDF as the package example-robot-data has it
-(`scripts/robots.sh`), and `gaitswarm optimize --robot` tunes it in its two default scenarios. A
-walk is three cycles; one without a fall is `ok`. The cost of transport is the motors' electrical
+`gaitswarm robot init` makes each robot of its file as the package example-robot-data or its
+repository has it (`scripts/robots.sh`), `robot check` lets it stand, and `gaitswarm optimize
+--robot` tunes it in its two default scenarios. A robot stands if its soles carry its weight. A walk
+is three cycles; one without a fall is `ok`. The cost of transport is the motors' electrical
 energy per weight and distance. The wall time is that of both commands, from an empty kernel cache.
 """
 
@@ -22,15 +23,18 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-from tests.robots.known import FOLDER, QUADRUPEDS
+from tests.robots.known import ROBOTS
 
 COMMAND: Final = "from gaitswarm.cli.main import main; main()"
 GRAVITY: Final = 9.81
 MOST_DESIGNS: Final = 1000
 
+STANDS: Final = 0.02
+"""Share of the weight by which the force on a standing robot's soles may be off."""
+
 HEAD: Final = """\
-| robot | mass | designs that walk both | `slow` | cost | `fast` | cost | time |
-| --- | --- | --- | --- | --- | --- | --- | --- |"""
+| robot | legs | mass | stands | designs that walk both | `slow` | cost | `fast` | cost | time |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"""
 
 
 def tuned(urdf: Path, folder: Path, options: argparse.Namespace) -> dict[str, Any]:
@@ -65,6 +69,7 @@ def tuned(urdf: Path, folder: Path, options: argparse.Namespace) -> dict[str, An
     upright = [all(row[f"{name}.status"] == "ok" for name in names) for row in designs]
     walks = {} if job["best"] is None else job["best"]["scenarios"]
     return {
+        "legs": len(check["legs"]),
         "mass": check["mass"],
         "standing": check["standing"]["normal_forces"] / check["standing"]["weight"],
         "designs": len(designs),
@@ -88,7 +93,9 @@ def _walk(result: dict[str, Any] | None, mass: float) -> dict[str, Any]:
 
 def line(name: str, row: dict[str, Any]) -> str:
     """Of the table, as docs/robots.md has it."""
-    cells = [name, f"{row['mass']:.1f} kg", f"{row['upright']} of {row['designs']}"]
+    stands = "yes" if abs(row["standing"] - 1.0) < STANDS else f"{row['standing']:.0%}"
+    cells = [name, str(row["legs"]), f"{row['mass']:.1f} kg", stands]
+    cells.append(f"{row['upright']} of {row['designs']}")
     for walk in row["walks"].values():
         walked = walk["status"] == "ok"
         cells += [
@@ -101,26 +108,27 @@ def line(name: str, row: dict[str, Any]) -> str:
 def main() -> None:
     """Print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("robots", nargs="*", default=list(QUADRUPEDS), metavar="ROBOT")
+    parser.add_argument("robots", nargs="*", default=list(ROBOTS), metavar="ROBOT")
     parser.add_argument("--iterations", type=int, default=20)
     parser.add_argument("--particles", type=int, default=25)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--evaluator", default="in-process")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    unknown = sorted(set(options.robots) - set(QUADRUPEDS))
+    unknown = sorted(set(options.robots) - set(ROBOTS))
     if unknown:
-        parser.error(f"unknown: {', '.join(unknown)}; known are {', '.join(QUADRUPEDS)}")
+        parser.error(f"unknown: {', '.join(unknown)}; known are {', '.join(ROBOTS)}")
     if options.iterations * options.particles > MOST_DESIGNS:
         parser.error(f"a job of at most {MOST_DESIGNS} designs is what is asked for")
-    if not FOLDER.is_dir():
-        parser.error("the URDFs of example-robot-data are missing: run scripts/robots.sh")
+    missing = [name for name in options.robots if not ROBOTS[name].is_file()]
+    if missing:
+        print(f"missing: {', '.join(missing)}; run scripts/robots.sh", file=sys.stderr)
     rows = {}
     if not options.json:
         print(HEAD)
-    for name in options.robots:
+    for name in (name for name in options.robots if name not in missing):
         with tempfile.TemporaryDirectory() as folder:
-            rows[name] = tuned(FOLDER / QUADRUPEDS[name], Path(folder), options)
+            rows[name] = tuned(ROBOTS[name], Path(folder), options)
         if not options.json:
             print(line(name, rows[name]), flush=True)
     if options.json:

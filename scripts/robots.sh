@@ -1,7 +1,9 @@
 #!/bin/sh
 # Have the URDFs of well-known robots, for the tests of robots that are not our own and for
 # `python -m benchmarks.known_robots`: those of the wheel example-robot-data, without their meshes
-# (415 MB), in .venv/robots. Nothing if they are there. .venv must be set up.
+# (415 MB), in .venv/robots, and for the benchmark the files of repositories that robots.sha256
+# lists, whose licences allow it, in .venv/repositories. Nothing if they are there. .venv
+# must be set up. ROBOTS_URL=URL replaces the address of OWNER/NAME/COMMIT/PATH.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -11,8 +13,38 @@ lock=requirements/robots.lock
 say() { printf 'robots: %s\n' "$*" >&2; }
 give_up() { say "$*; robots that are not our own are not tested"; exit 69; }
 
+fetch_files() {
+    "$venv/bin/python" - requirements/robots.sha256 "$venv/repositories" <<'EOF'
+import hashlib
+import os
+import sys
+from pathlib import Path
+from urllib.request import urlopen
+
+base = os.environ.get("ROBOTS_URL", "https://raw.githubusercontent.com")
+listed, folder = map(Path, sys.argv[1:])
+for line in listed.read_text().splitlines():
+    digest, name = line.split(maxsplit=1)
+    owner, repository, _commit, path = name.split("/", 3)
+    to = folder / owner / repository / path
+    if to.is_file():
+        continue
+    try:
+        content = urlopen(f"{base}/{name}", timeout=20).read()
+    except OSError as error:
+        sys.exit(f"robots: {name}: {error}; robots of repositories are not in the benchmark")
+    if hashlib.sha256(content).hexdigest() != digest:
+        sys.exit(f"robots: {name}: not the file that robots.sha256 lists")
+    to.parent.mkdir(parents=True, exist_ok=True)
+    to.write_bytes(content)
+EOF
+}
+
 key=$(cat "$lock" scripts/robots.sh | cksum)
-[ "$(cat "$robots/lock" 2>/dev/null)" != "$key" ] || exit 0
+if [ "$(cat "$robots/lock" 2>/dev/null)" = "$key" ]; then
+    fetch_files || true
+    exit 0
+fi
 
 say "fetching URDFs of well-known robots (131 MB)"
 scratch=$(mktemp -d "$venv/robots.XXXXXX")
@@ -39,3 +71,4 @@ EOF
 echo "$key" > "$scratch/robots/lock"
 rm -rf "$robots"
 mv "$scratch/robots" "$robots"
+fetch_files || true

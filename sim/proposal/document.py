@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import takewhile
 from typing import Any, Final
@@ -56,8 +56,9 @@ from gaitswarm.sim.proposal.stance import (
 )
 from gaitswarm.sim.robot.bounds import check_urdf
 from gaitswarm.sim.robot.elements import by_line
+from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import parse_robot
-from gaitswarm.sim.robot.urdf import parse_urdf, possible, unphysical
+from gaitswarm.sim.robot.urdf import Urdf, parse_urdf, unphysical
 
 _LEVEL: Final = 0.2
 """Accepted height of hips above or below the body's origin, relative to the legs' length."""
@@ -119,35 +120,62 @@ _AIR, _DENSITY = 1.2, 150.0
 """Mass of a robot by the cube of its legs' length [kg/m3]: below the first one it would fly; the
 second one is usual."""
 
-_NO_MASS: Final = (
-    "its masses are placeholders, {:.2g} kg in all: {:g} kg is a guess by its size; give it as"
-    " `--mass`"
-)
+_SPREAD: Final = 1.0
+"""Largest radius of gyration of a link, relative to the legs' length."""
 
-_WATER: Final = 1000.0
-"""Density of a ball in place of an impossible inertia [kg/m3]."""
+_BALL: Final = 200.0
+"""Density of a ball in place of an implausible inertia [kg/m3]."""
 
 
-def with_mass(urdf: str, mass: float) -> str:
-    """Scale all masses of a URDF to a sum [kg]; links of impossible inertia become balls."""
-    tree = parse_urdf(urdf)
-    root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
-    share = mass / tree.total_mass
+def _with_plausible_inertias(
+    text: str, held: Mapping[str, float], legs: Sequence[ChainLeg], mass: float | None
+) -> tuple[str, Urdf, list[str]]:
+    """Scale masses to a given or plausible sum [kg], and replace inertias of far too large bodies.
+
+    Returns:
+        The changed URDF as text and parsed, and a sentence on each change.
+    """
+    tree, notes = parse_urdf(text, held), list[str]()
+    length = max(sum(leg.lengths) for leg in legs)
+    masses = {part: body.mass for part, body in tree.bodies.items()}
+    shares = dict.fromkeys(masses, 1.0 if mass is None else mass / tree.total_mass)
+    if tree.total_mass < _AIR * length**3:
+        mass = mass or float(f"{_DENSITY * length**3:.2g}")
+        notes.append(
+            f"its masses are placeholders, {tree.total_mass:.2g} kg in all: it is taken to have"
+            f" {mass:g} kg (`--mass`), half of them in its body"
+        )
+        trunk = next(iter(masses))
+        if 0.0 < masses[trunk] < tree.total_mass:
+            shares = dict.fromkeys(masses, 0.5 * mass / (tree.total_mass - masses[trunk]))
+            shares[trunk] = 0.5 * mass / masses[trunk]
+    odd = [
+        name
+        for name, link in tree.links.items()
+        if np.trace(link.inertia.rotational) > 2.0 * link.inertia.mass * (_SPREAD * length) ** 2
+    ]
+    if odd:
+        more = f" and {len(odd) - 1} others" if len(odd) > 1 else ""
+        notes.append(
+            f"the inertia of link {odd[0]!r}{more} would need a body larger than the robot: that of"
+            " a ball is used"
+        )
+    if mass is None and not odd:
+        return text, tree, notes
+    root = ET.fromstring(text)  # noqa: S314 - it was checked when it was parsed
     for link in root.findall("link"):
-        part = tree.links[link.get("name", "")].inertia
-        inertial = link.find("inertial")
-        if inertial is None or not part.mass:
-            continue
-        scaled = part.mass * share
-        ball = 0.4 * scaled * (3.0 * scaled / (4.0 * math.pi * _WATER)) ** (2.0 / 3.0)
-        for element in inertial.findall("mass"):
+        name = link.get("name", "")
+        share = shares[tree.places[name].body]
+        scaled = tree.links[name].inertia.mass * share
+        ball = 0.4 * scaled * (3.0 * scaled / (4.0 * math.pi * _BALL)) ** (2.0 / 3.0)
+        for element in link.findall("inertial/mass"):
             element.set("value", repr(scaled))
-        for element in inertial.findall("inertia"):
-            for name, value in element.items():
-                moment = ball if name in ("ixx", "iyy", "izz") else 0.0
-                number = float(value) * share if possible(part) else moment
-                element.set(name, repr(number))
-    return ET.tostring(root, encoding="unicode")
+        for element in link.findall("inertial/inertia"):
+            for key, value in element.items():
+                moment = ball if key in ("ixx", "iyy", "izz") else 0.0
+                element.set(key, repr(moment if name in odd else float(value) * share))
+    text = ET.tostring(root, encoding="unicode")
+    return text, parse_urdf(text, held), notes
 
 
 _PREFERENCE: Final = "C"
@@ -209,14 +237,7 @@ def propose_robot(
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
     legs = [chain_leg(tree, leg.joints, leg.end.at) for leg in found.legs]
-    size = max(sum(leg.lengths) for leg in legs) ** 3
-    mass = hints.mass
-    if mass is None and tree.total_mass < _AIR * size:
-        mass = float(f"{_DENSITY * size:.2g}")
-        moved = [*moved, _NO_MASS.format(tree.total_mass, mass)]
-    if mass is not None:
-        text = with_mass(text, mass)
-        tree = parse_urdf(text, found.held)
+    text, tree, notes = _with_plausible_inertias(text, found.held, legs, hints.mass)
     with by_line(urdf):
         stance = choose_stance(legs, height)
     standing = [
@@ -240,7 +261,7 @@ def propose_robot(
         "preference": _PREFERENCE,
         "scenarios": propose_scenarios(stance, sole.length, names),
     }
-    notes = [*moved, _TWO_LEGS] if len(legs) == 2 else moved
+    notes += [*moved, _TWO_LEGS] if len(legs) == 2 else moved
     if frame.forward is None and sideways(legs, stance.angles):
         notes.append(_SIDEWAYS)
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.end.notes]

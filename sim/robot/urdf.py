@@ -281,10 +281,10 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
             )
             yield with_line(text, f"robot.urdf: {problem}")
             continue
-        if possible(body):
+        if _possible(body):
             continue
         inertias = ((link, urdf.links[link].inertia) for link in parts[name])
-        wrong = {link: of for link, of in inertias if of.mass and not possible(of)}
+        wrong = {link: of for link, of in inertias if of.mass and not _possible(of)}
         for link, inertia in (wrong or {name: body}).items():
             moments = ", ".join(f"{moment:.3g}" for moment in _moments(inertia))
             problem = (
@@ -297,8 +297,7 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
         yield with_line(text, f"robot.urdf: link {first!r}{more}: {problem}")
 
 
-def possible(inertia: BodyInertia) -> bool:
-    """Whether a body can have such moments of inertia."""
+def _possible(inertia: BodyInertia) -> bool:
     least, middle, largest = _moments(inertia)
     return bool(least > _NONE * largest and largest <= (least + middle) * (1.0 + _ROUNDED))
 

@@ -26,8 +26,30 @@ QUADRUPEDS: Final = {
 }
 """Robots of the package whose legs have three joints, by name."""
 
+CENTAURO: Final = "centauro_description/urdf/centauro.urdf"
+"""A quadruped with legs of five joints and a wheel, a torso and two arms."""
+
 BIPED: Final = "bolt_description/robots/bolt.urdf"
 """The only other one with such legs."""
+
+
+HEXAPODS_AND_OTHERS: Final = {
+    "phantomx": "HumaRobotics/phantomx_description/urdf/phantomx.xacro",
+    "phantomx_ros": "KevinOchs/hexapod_ros/hexapod_description/urdf/phantomX_model.xacro",
+    "hexapod_ros": "KevinOchs/hexapod_ros/hexapod_description/urdf/hexapod_model.xacro",
+    "spot_micro": "OpenQuadruped/spot_mini_mini/mini_ros/urdf/spot.urdf",
+    "go1 (MJCF)": "google-deepmind/mujoco_menagerie/unitree_go1/go1.xml",
+    "a2 (MJCF)": "unitreerobotics/unitree_ros/robots/a2_description/a2.xml",
+    "go2w": "unitreerobotics/unitree_ros/robots/go2w_description/urdf/go2w_description.urdf",
+}
+"""Robots in files of repositories: xacro, MJCF, wheels, placeholder masses, four joints a leg."""
+
+ROBOTS: Final = {
+    **{name: FOLDER / file for name, file in QUADRUPEDS.items()},
+    "centauro": FOLDER / CENTAURO,
+    **{name: FOLDER.parent / "repositories" / file for name, file in HEXAPODS_AND_OTHERS.items()},
+}
+"""Files of all, by name."""
 
 
 def urdf_of(file: str) -> Path:

@@ -268,8 +268,10 @@ def test_placeholder_masses_are_replaced_by_a_guess_or_by_the_given_mass(
         made = tmp_path / f"made{number}"
         assert run(["robot", "init", str(file), "-o", str(made), "--json", *options]) == 0
         guesses = json.loads(capsys.readouterr().out)["guesses"]
-        noted = any("its masses are placeholders, 0.00013 kg" in guess for guess in guesses)
-        assert noted == (number == 0)
+        assert any("its masses are placeholders, 0.00013 kg" in guess for guess in guesses)
+        assert any("'trunk' and 12 others would need a body larger" in guess for guess in guesses)
         assert not any("cannot have the principal moments" in guess for guess in guesses)
-        masses.append(parse_urdf((made / "robot.urdf").read_text()).total_mass)
+        tree = parse_urdf((made / "robot.urdf").read_text())
+        masses.append(tree.total_mass)
+        assert tree.body.mass == pytest.approx(0.5 * masses[-1])
     assert masses == pytest.approx([17.0, 12.0], rel=0.01)

@@ -23,7 +23,7 @@ from gaitswarm.sim.robot import Robot, parse_robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from tests.examples.walks import random_state, short_walk
-from tests.robots.known import BIPED, FOLDER, QUADRUPEDS, urdf_of
+from tests.robots.known import BIPED, CENTAURO, FOLDER, QUADRUPEDS, urdf_of
 from tests.sim.pinocchio_oracle import Oracle
 
 pytestmark = pytest.mark.slow
@@ -186,15 +186,26 @@ def test_it_stands_with_its_weight_on_all_feet(robot: Robot) -> None:
 def test_other_files_of_the_package_are_refused_with_the_supported_kinds() -> None:
     """Arms, hands, humanoids with legs of six joints, quadrotors, wheels, objects."""
     urdf_of(BIPED)
-    legged = {FOLDER / file for file in (*QUADRUPEDS.values(), BIPED)}
+    legged = {FOLDER / file for file in (*QUADRUPEDS.values(), BIPED, CENTAURO)}
     others = sorted(set(FOLDER.glob("**/*.urdf")) - legged)
     assert len(others) > 40
     for path in others:
-        with pytest.raises(RobotFileError, match=r"robot\.urdf: ") as refused:
+        with pytest.raises(RobotFileError, match=r"^robot\.urdf") as refused:
             propose_robot(path.read_text(encoding="utf-8"), path.stem)
         assert any(
-            said in str(refused.value) for said in ("legs need three revolute joints", "no <link>")
+            said in str(refused.value)
+            for said in ("legs need three revolute joints", "no <link>", "seems to point up")
         ), (path.name, str(refused.value))
+
+
+def test_a_centaur_walks_on_three_joints_of_each_leg(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["robot", "init", str(urdf_of(CENTAURO)), "--output", str(tmp_path / "it")]) == 0
+    assert "'torso_yaw' is held at 0 rad" in capsys.readouterr().out
+    robot = read(tmp_path / "it")
+    assert len(robot.legs) == 4 and robot.n_joints == 12
+    assert {"ankle_yaw_1", "j_wheel_1"} <= set(robot.description.held_joints)
 
 
 def test_a_biped_is_made_with_a_warning_that_it_may_not_stand(

@@ -156,3 +156,21 @@ def test_meshes_of_a_package_are_found(
     made = ["robot", "init", str(urdf), "-o", str(tmp_path / "made"), *options, "--json"]
     assert run(made) == 0
     assert json.loads(capsys.readouterr().out)["meshes"]["left_out"] == []
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        (["--lock", "FL_calf_joint"], "lock: 'FL_calf_joint' is not JOINT=ANGLE"),
+        (["--lock", "FL_calf_joint=low"], "lock: 'low' is not a number"),
+        (["--foot", "FL_calf=0,0"], "foot: '0,0' is not 3 numbers separated by commas"),
+        (["--foot", "FL_calf=0,0,nan"], "foot: '0,0,nan' is not 3 numbers"),
+    ],
+)
+def test_malformed_hints_are_refused_by_option(
+    option: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "dog.urdf").write_text(dog(), encoding="utf-8")
+    made = ["robot", "init", str(tmp_path / "dog.urdf"), "-o", str(tmp_path / "made"), *option]
+    assert run(made) == 2
+    assert said in " ".join(capsys.readouterr().err.split())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -19,6 +19,8 @@ from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from gaitswarm.sim.replay import CONTROL_RATE, SAMPLED, Replay
 from gaitswarm.sim.replay import replay as replayed
 from gaitswarm.sim.robot import RobotFiles, load_robot
+from gaitswarm.sim.robot.actuators import TorqueActuator
+from gaitswarm.sim.robot.description import RobotDescription
 from gaitswarm.sim.robot.shapes import VisibleLink
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.simulation import QUANTITIES
@@ -71,6 +73,15 @@ class MovingRobotView(View):
     links: list[VisibleLink] = Field(description="All links, parents first; the body is the first.")
     joints: list[str] = Field(description="Joints in the order of channels.")
     legs: list[str] = Field(description="Legs in the order of channels.")
+    mass: float = Field(description="Mass without load [kg].", examples=[4.05])
+    torque_limits: list[float] = Field(
+        description="By joint, torque at the joint: nominal one of a gearhead, or largest one of a"
+        " torque-controlled actuator [N m]."
+    )
+    current_limits: list[float] = Field(
+        description="By joint: stall current of a DC motor at the battery's voltage, or the current"
+        " of a torque-controlled actuator's largest torque [A]."
+    )
 
 
 class GroundView(View):
@@ -141,6 +152,7 @@ def run_replay(request: ReplayRequest) -> bytes:
     status = Status(outcome.outcome.statuses[0])
     objectives = map(finite, outcome.outcome.objectives[0].tolist())
     legs = [leg.name for leg in robot.legs]
+    torques, currents = zip(*_limits(robot.description), strict=True)
     channels = _channels(walk, robot.joint_names, legs)
     frames = _frames([getattr(walk, channel.name) for channel in channels])
     x, y, z = gravity_on(scenario.slope, scenario.slope_direction).tolist()
@@ -159,6 +171,9 @@ def run_replay(request: ReplayRequest) -> bytes:
             links=list(walk.links),
             joints=list(robot.joint_names),
             legs=legs,
+            mass=robot.mass,
+            torque_limits=list(torques),
+            current_limits=list(currents),
         ),
         ground=GroundView(slope_deg=scenario.slope, slope_direction_deg=scenario.slope_direction),
         gravity=(x, y, z),
@@ -166,6 +181,18 @@ def run_replay(request: ReplayRequest) -> bytes:
         channels=channels,
     )
     return framed(header, frames)
+
+
+def _limits(robot: RobotDescription) -> Iterator[tuple[float, float]]:
+    """Yield each joint's limits of torque [N m] and current [A]."""
+    for actuator in (robot.actuators[name] for leg in robot.legs for name in leg.actuators):
+        if isinstance(actuator, TorqueActuator):
+            per_ampere = actuator.gear_ratio * actuator.torque_constant
+            yield actuator.torque_limit, actuator.torque_limit / per_ampere
+        else:
+            gear, motor = robot.gearheads[actuator.gearhead], robot.motors[actuator.motor]
+            stall = robot.supply.voltage / motor.resistance
+            yield gear.nominal_torque * actuator.bevel, stall
 
 
 def _channels(walk: Replay, joints: Sequence[str], legs: Sequence[str]) -> list[ChannelView]:

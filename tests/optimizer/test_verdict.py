@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gaitswarm.services.optimizer.analysis.bounds import WidenedView
 from gaitswarm.services.optimizer.analysis.feasibility import LimitView
 from gaitswarm.services.optimizer.analysis.verdict import (
     QUANTITIES,
@@ -230,14 +231,15 @@ def test_bounds_of_a_design_are_named_and_those_that_can_be_widened_all_at_once(
     spec = tuning().resolved()
     space = spec.design_space()
     middle = (space.low + space.high) / 2.0
-    assert bounds_reached(spec, middle) == ([], {})
+    assert bounds_reached(spec, middle) == []
     assert list(bounds_in_words([], 9)) == []
 
     design = np.where([v.name in ("FI1R", "FOMF") for v in space.variables], space.high, middle)
-    bounds, widened = bounds_reached(spec, design)
+    bounds = bounds_reached(spec, design)
     assert [(bound.name, bound.at) for bound in bounds] == [("FI1R", "high"), ("FOMF", "high")]
     assert list(bounds_in_words(bounds, 9)) == [
         "At a bound of the search: 2 of 9 variables, FI1R at 6000 counts and FOMF at 3."
     ]
     # The controller accepts no FOMF above 3.
-    assert widened == {"FI1R": "1500:8250"}
+    widened = {bound.name: bound.widened for bound in bounds}
+    assert widened == {"FI1R": WidenedView(low=1500.0, high=8250.0), "FOMF": None}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from playwright.sync_api import Locator, Page, expect
 
 _REACHED = "index => Number(document.querySelector('[data-stream]')?.dataset.iteration) >= index"
@@ -9,6 +11,17 @@ _REACHED = "index => Number(document.querySelector('[data-stream]')?.dataset.ite
 
 def job_element(page: Page) -> Locator:
     return page.locator("[data-stream]")
+
+
+def command(page: Page, name: str) -> Locator:
+    """A command of the job's menu, which may be closed."""
+    return page.locator(".actions [role=menuitem]").filter(has_text=re.compile(f"^{name}$"))
+
+
+def choose(page: Page, name: str) -> None:
+    """Choose a command of the job's menu."""
+    page.get_by_role("button", name=re.compile("^Actions")).click()
+    command(page, name).click()
 
 
 def shown_iteration(page: Page) -> int:

@@ -27,7 +27,8 @@ def test_variables_are_sorted_by_importance_for_the_chosen_output(
 ) -> None:
     importance = importance_of(server, finished_job)
     page = visit(server.url).go(f"/jobs/{finished_job}")
-    page.get_by_role("link", name="Analysis").click()
+    page.get_by_role("link", name="Explore").click()
+    page.get_by_role("link", name="Importance").click()
     bars = page.locator("[data-output] [data-variable]")
     expect(bars).to_have_count(len(importance["variables"]))
     for output in ("fitness", "energy"):

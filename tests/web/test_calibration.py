@@ -11,6 +11,7 @@ from playwright.sync_api import expect
 
 from tests.examples.servers import ServerProcess
 from tests.examples.walks import SHORT_WALK
+from tests.web.job_page import choose
 from tests.web.test_views import PHONE, TOO_WIDE
 from tests.web.visit import Visit
 
@@ -57,19 +58,7 @@ def test_the_list_shows_its_kind_and_its_page_the_applicable_tabs(
     expect(row).to_contain_text("calibration")
     row.get_by_role("link", name="two laws of friction").click()
     tabs = page.get_by_role("navigation", name="Parts of the job")
-    expect(tabs.get_by_role("link")).to_have_text(
-        [
-            "Overview",
-            "Targets",
-            "Walks",
-            "Parameters",
-            "Analysis",
-            "Variables",
-            "Iterations",
-            "Activity",
-            "Spec",
-        ]
-    )
+    expect(tabs.get_by_role("link")).to_have_text(["Result", "Explore", "Details"])
     best = server.job(calibration)["best"]["design"]["contact_law"]
     expect(page.get_by_role("definition").filter(has_text=best.replace("_", " "))).to_be_visible()
 
@@ -78,7 +67,7 @@ def test_targets_show_deviation_and_use(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     targets = server.client.get(f"/v1/jobs/{calibration}/targets").json()["targets"]
-    page = visit(server.url).go(f"/jobs/{calibration}/targets")
+    page = visit(server.url).go(f"/jobs/{calibration}")
 
     rows = [page.locator(f'[data-target="stiff {name}"]') for name in ("speed", "energy")]
     for row, target, use in zip(rows, targets, ("fitted", "predicted"), strict=True):
@@ -93,6 +82,20 @@ def test_targets_show_deviation_and_use(
     # With a single target, nothing is left to fit.
     page.get_by_label("Predict each target without").select_option("target")
     expect(page.get_by_role("columnheader", name="Left out", exact=True)).to_be_visible()
+
+
+def test_a_calibration_that_meets_no_target_does_not_look_succeeded(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    far = [{"walk": "stiff", "quantity": "speed", "value": 0.9, "tolerance": 0.01}]
+    job_id = server.submit(CALIBRATION | {"targets": far, "name": "too fast", "iterations": 1})
+    server.wait_for(job_id, "succeeded")
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    badge = page.get_by_role("status").locator(".badge")
+    expect(badge).to_have_text("0 of 1 targets met")
+    expect(badge).to_have_attribute("data-tone", "bad")
+    expect(page.get_by_role("heading", name="0 of 1 targets met")).to_be_visible()
+    expect(page.get_by_text("succeeded", exact=True)).to_have_count(0)
 
 
 @pytest.mark.thorough("test_targets_show_deviation_and_use")
@@ -123,7 +126,7 @@ def test_no_tab_scrolls_horizontally(
 ) -> None:
     visited = visit(server.url, viewport=PHONE)
     overflows = {}
-    for part in ("", "/targets", "/scenarios", "/parameters", "/variables"):
+    for part in ("", "/parameters", "/variables", "/summary"):
         page = visited.go(f"/jobs/{calibration}{part}")
         page.wait_for_load_state("networkidle")
         expect(page.get_by_role("main").get_by_role("heading", level=2).first).to_be_visible()
@@ -137,7 +140,7 @@ def test_it_is_cloned_as_json(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{calibration}")
-    page.get_by_role("link", name="Clone").click()
+    choose(page, "Clone")
 
     spec = page.get_by_role("textbox", name="Spec as JSON")
     expect(spec).to_have_value(re.compile('"kind": "calibration"'))

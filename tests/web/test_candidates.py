@@ -20,7 +20,7 @@ def test_candidates_are_shown_against_the_reference_and_can_be_tuned_by(
     job_id = server.submit(DOCUMENT)
     server.wait_for(job_id, "succeeded")
     view = server.client.get(f"/v1/jobs/{job_id}/preferences").json()
-    page = visit(server.url).go(f"/jobs/{job_id}/candidates")
+    page = visit(server.url).go(f"/jobs/{job_id}")
 
     table = page.get_by_role("table", name="Preferences and their optima")
     names = [c["named"] or f"{c['iteration']}.{c['particle']}" for c in view["candidates"]]
@@ -45,7 +45,7 @@ def test_a_search_is_submitted_from_the_job_that_it_tunes(
     page = visit(server.url).go(f"/jobs/{tuned}/robustness")
     page.get_by_role("button", name="Search for preferences").click()
     expect(page.get_by_role("heading", name=f"preferences of {tuned}")).to_be_visible()
-    job_id = page.url.rpartition("/candidates")[0].rpartition("/")[2]
+    job_id = page.url.rpartition("/")[2]
     spec = server.client.get(f"/v1/jobs/{job_id}").json()["spec"]
     best = server.client.get(f"/v1/jobs/{tuned}/best").json()["design"]
     assert (spec["kind"], spec["tuning"]["start"][0]) == ("preferences", best)

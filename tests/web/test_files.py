@@ -41,7 +41,7 @@ def opaque(canvas: Locator, x: float, y: float) -> bool:
 def test_a_chart_is_exported_as_numbers_and_pictures(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}?dots=yes")
+    page = visit(server.url).go(f"/jobs/{finished_job}")
     expect(page.locator("[data-dots]")).to_be_visible()
     # All six iterations, even if loaded before the chart.
     expect(page.locator(".uplot").first).to_have_attribute("data-range", "0 5")

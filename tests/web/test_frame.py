@@ -40,7 +40,7 @@ def test_titles_name_the_job_and_its_progress(
     expect(page).to_have_title("Jobs · gaitswarm")
     waiting = start_server()
     page = visit(waiting.url).go(f"/jobs/{waiting.submit(SMALL_JOB)}")
-    expect(page).to_have_title("small · queued 0/6 · gaitswarm")
+    expect(page).to_have_title("small · queued 0/48 · gaitswarm")
 
 
 @pytest.mark.thorough("test_titles_name_the_job_and_its_progress")
@@ -91,7 +91,7 @@ def test_the_title_of_a_walk_shows_the_progress_of_its_job(
     wait_for_iteration(visited.go(f"/jobs/{endless_job}"), 3)
     page = visited.go(f"/walk?job={endless_job}&scenario=loaded")
     named = "Best of small, scenario loaded"
-    expect(page).to_have_title(re.compile(rf"^{named} · running \d+/5000 · Walk · gaitswarm$"))
+    expect(page).to_have_title(re.compile(rf"^{named} · running \d+/40000 · Walk · gaitswarm$"))
     before = page.title()
 
     show_tab_again(page)

@@ -11,6 +11,7 @@ from playwright.sync_api import Page, expect
 from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import (
+    choose,
     expect_state,
     job_element,
     shown_iteration,
@@ -70,10 +71,10 @@ def test_a_job_is_submitted_watched_paused_reloaded_and_resumed(
     expect_state(page, "running")
 
     # Cancelling requires confirmation.
-    page.get_by_role("button", name="Cancel…").click()
+    choose(page, "Cancel…")
     page.get_by_role("button", name="Back").click()
     assert server.job(job_id)["state"] == "running"
-    page.get_by_role("button", name="Cancel…").click()
+    choose(page, "Cancel…")
     page.get_by_role("button", name="Cancel the job").click()
     expect_state(page, "cancelled")
     assert server.job(job_id)["state"] == "cancelled"
@@ -118,8 +119,9 @@ def test_a_job_is_submitted_and_followed_by_keyboard_alone(
     wait_for_iteration(page, 1)
     expect_state(page, "succeeded")
 
-    press_until_focused(page, "Iterations")
-    page.keyboard.press("Enter")
+    for link in ("Details", "Iterations"):
+        press_until_focused(page, link)
+        page.keyboard.press("Enter")
     expect(page.get_by_role("table", name="Iterations")).to_be_visible()
     press_until_focused(page, "0")
     page.keyboard.press("Enter")
@@ -149,19 +151,19 @@ def test_a_job_is_extended_and_cloned(server: ServerProcess, visit: Callable[...
     done = server.wait_for(job_id, "succeeded")["iterations"]
     page = visit(server.url).go(f"/jobs/{job_id}")
 
-    page.get_by_role("button", name="Extend…").click()
-    page.get_by_label(re.compile("^Iterations in total")).fill(str(done + 2))
-    page.get_by_role("button", name=f"Run {done + 2} iterations in total").click()
+    choose(page, "Extend…")
+    page.get_by_label("Evaluations in total").fill(str(8 * done + 16))
+    page.get_by_role("button", name=f"Run {8 * done + 16} evaluations in total").click()
     wait_for_iteration(page, done + 1)
     expect_state(page, "succeeded")
 
-    page.get_by_role("link", name="Clone").click()
+    choose(page, "Clone")
     expect(page.get_by_label("Name", exact=True)).to_have_value("small")
     expect(page.get_by_label(re.compile("^particles", re.IGNORECASE))).to_have_value("8")
     expect(page.locator("[data-custom]")).to_have_count(2)
 
 
-@pytest.mark.thorough("test_a_jobs_headline_convergence_winner_and_walk")
+@pytest.mark.thorough("test_a_result_is_shown_in_words_figures_and_charts_before_anything_else")
 def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
@@ -174,8 +176,9 @@ def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     job_id = submitted(page)
     best = server.wait_for(job_id, "succeeded")["best"]
     expect_state(page, "succeeded")
-    expect(page.locator(".job-header p").filter(has_text="single precision")).to_be_visible()
-    figures = page.locator(".job-header dl")
+    page.goto(f"{page.url}/summary")
+    figures = page.get_by_role("region", name="Summary").locator("dl")
+    expect(figures.locator("div", has_text="Precision")).to_contain_text("single")
     expect(figures).to_contain_text("Best fitness (double precision)")
     expect(figures).to_contain_text(f"{best['fitness']:.7g}")
     searched = figures.locator("div", has_text="Fitness in the search (single precision)")
@@ -183,39 +186,112 @@ def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     expect(searched).to_contain_text("%")
 
 
-def test_a_jobs_headline_convergence_winner_and_walk(
+def test_a_result_is_shown_in_words_figures_and_charts_before_anything_else(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     job = server.job(finished_job)
+    verdict = server.client.get(f"/v1/jobs/{finished_job}/verdict").json()
     page = visit(server.url).go(f"/jobs/{finished_job}")
-    gain = page.locator(".job-header dl div", has_text="Gain over published A")
-    expect(gain).to_contain_text("%")
-    assert abs(float(re.split(r"\s", gain.inner_text().split("\n")[1].replace("\u2212", "-"))[0])
-        - 100.0 * job["gain"]) < 0.06  # fmt: skip
+    header = page.get_by_role("region", name="Job summary")
+    expect(header).to_contain_text(f"{job['evaluations']} evaluations in {job['iterations']} iter")
+    better = f"{100 * job['gain']:#.2g}".rstrip(".")
+    card = page.get_by_role("region", name="Verdict")
+    heading = card.get_by_role("heading", name=f"{better}\xa0% better than published A")
+    expect(heading).to_be_visible()
+    for sentence in verdict["sentences"][:-1]:
+        expect(card).to_contain_text(sentence)
+
+    # Each figure is judged by a word and a mark, not by its colour alone.
+    for name in ("speed", "energy", "peak_current", "torque", "acceleration"):
+        figure = card.locator(f"[data-figure={name}]")
+        (quantity,) = (each for each in verdict["quantities"] if each["name"] == name)
+        judged = figure.locator(".judged")
+        expect(judged).to_have_attribute("data-tone", quantity["judgement"])
+        mark = {"better": "✓", "same": "=", "worse": "✗"}[quantity["judgement"]]
+        expect(judged).to_contain_text(mark)
+
+    # One primary button in view: the next step.
+    primary = page.get_by_role("main").locator(".primary")
+    expect(primary).to_have_text("Widen and run again" if verdict["widen"] else "Certify")
+
     chart = page.get_by_role("img", name=re.compile("^Convergence over 6 iterations"))
     expect(chart).to_have_attribute("aria-label", re.compile("published A"))
-    page.get_by_label("single designs").check()
-    expect(page).to_have_url(re.compile("dots=yes$"))
     walked = page.locator("[data-dots]")
     expect(walked).to_contain_text("designs")
     assert 0 < int(walked.get_attribute("data-dots") or 0) <= job["evaluations"]
+    page.get_by_label("bands").check()
+    expect(page).to_have_url(re.compile("bands=yes$"))
+    expect(page.get_by_text("5 % to 95 %")).to_be_visible()
 
-    verdict = server.client.get(f"/v1/jobs/{finished_job}/verdict").json()
-    card = page.get_by_role("region", name="Verdict")
-    for sentence in verdict["sentences"]:
-        expect(card).to_contain_text(sentence)
-    rows = card.get_by_role("table", name="Change against the reference").locator("tbody tr")
-    expect(rows).to_have_count(len(job["scenarios"]))
-    figures = [f for quantity in verdict["quantities"] for f in quantity["scenarios"].values()]
-    better = [figure for figure in figures if figure["judgement"] == "better"]
-    expect(rows.locator("[data-tone=better]")).to_have_count(len(better))
-
-    winner = page.get_by_role("region", name="Winner")
-    expect(winner.get_by_role("img")).to_have_count(len(job["best"]["design"]))
-    winner.get_by_role("button", name=re.compile("^Show as table.*Winner")).click()
-    rows = winner.get_by_role("table", name="Winner and search bounds").locator("tbody tr")
+    best = page.get_by_role("region", name="Best design")
+    expect(best.get_by_role("img")).to_have_count(len(job["best"]["design"]))
+    best.get_by_role("button", name=re.compile("^Show as table.*Best design")).click()
+    rows = best.get_by_role("table", name="Best design and search bounds").locator("tbody tr")
     expect(rows).to_have_count(len(job["best"]["design"]))
 
+    # The replay is neither loaded nor played until it is requested.
+    assert page.locator("canvas[data-engine]").count() == 0
+    page.get_by_role("button", name="Play the walk").click()
+    expect(page.get_by_role("img", name="Replay of the best design")).to_be_visible()
+    expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "false")
+    page.get_by_role("button", name="Play", exact=True).click()
+    expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "true")
+
+
+def test_a_click_on_the_convergence_opens_the_iteration(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    chart = page.locator(".u-over").first
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", "0 5")
+    box = chart.bounding_box()
+    assert box is not None
+    chart.click(position={"x": 0.6 * box["width"], "y": box["height"] / 2})
+    expect(page).to_have_url(re.compile("/iterations/3$"))
+    expect(page.get_by_role("table", name="Designs of iteration 3")).to_be_visible()
+
+
+def test_former_addresses_of_tabs_lead_to_their_sections(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(server.url)
+    for old, new in (
+        ("/scenarios?against=none", "?against=none"),
+        ("?tab=variables", "/variables"),
+        ("?tab=overview", ""),
+    ):
+        page = visited.go(f"/jobs/{finished_job}{old}")
+        expect(page).to_have_url(f"{server.url}/jobs/{finished_job}{new}")
+    tabs = page.get_by_role("navigation", name="Parts of the job")
+    expect(tabs.get_by_role("link")).to_have_text(
+        ["Result", "Walk", "Explore", "Robustness", "Details"]
+    )
+
+
+def test_the_best_design_is_certified_with_one_click(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/robustness")
+    card = page.get_by_role("region", name="Certificate")
+    expect(card).to_contain_text("There is none yet.")
+    card.get_by_role("button", name="Certify").click()
+    expect(page.get_by_role("heading", name="certificate of small")).to_be_visible()
+    certificate = page.url.rpartition("/")[2]
+    server.wait_for(certificate, "succeeded")
+    # A certificate opens with its verdict.
+    expect(page.get_by_role("heading", name=re.compile("^Fails in at most .* %"))).to_be_visible()
+    expect(page.get_by_role("img", name=re.compile("^Worlds by fitness"))).to_be_visible()
+
+    page.goto(f"{server.url}/jobs/{finished_job}/robustness")
+    expect(card.get_by_role("heading", name=re.compile("^Fails in at most"))).to_be_visible()
+    expect(card.get_by_role("link")).to_have_attribute("href", f"/jobs/{certificate}")
+
+
+def test_activity_is_filtered_by_level(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    page.get_by_role("link", name="Details").click()
     page.get_by_role("link", name="Activity").click()
     expect(page.get_by_role("img", name=re.compile("^Timeline of"))).to_be_visible()
     machines = page.get_by_role("table", name="Workers of the job").locator("tbody tr")
@@ -224,14 +300,6 @@ def test_a_jobs_headline_convergence_winner_and_walk(
     expect(page).to_have_url(re.compile("level=ERROR$"))
     page.reload()
     expect(page.get_by_label("Minimum level")).to_have_value("ERROR")
-    page.go_back()
-
-    # With reduced motion, the replay is neither loaded nor played automatically.
-    page.get_by_role("button", name="Show the replay").click()
-    expect(page.get_by_role("img", name="Replay of the best design")).to_be_visible()
-    expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "false")
-    page.get_by_role("button", name="Play").click()
-    expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "true")
 
 
 def test_a_clone_has_the_same_spec(server: ServerProcess, visit: Callable[..., Visit]) -> None:

@@ -11,6 +11,7 @@ from playwright.sync_api import Page, Route, expect
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import choose, command
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -46,10 +47,10 @@ def test_deletion_states_what_is_lost_and_what_remains(
     fork = server.wait_for(forked.json()["id"], "succeeded")
     page = visit(server.url).go(f"/jobs/{job_id}")
 
-    click_button(page, "Delete…")
+    choose(page, "Delete…")
     dialog = page.get_by_role("dialog")
     expect(dialog).to_contain_text(
-        f"{job['iterations']} iterations with {job['evaluations']} evaluated designs are"
+        f"{job['evaluations']} evaluations in {job['iterations']} iterations are"
         " permanently lost. Forks of the job keep their copies but lose their parent; certificates"
         " of its designs are separate jobs and remain."
     )
@@ -58,7 +59,7 @@ def test_deletion_states_what_is_lost_and_what_remains(
     assert server.job(job_id)["state"] == "succeeded"
 
     page.route(f"**/v1/jobs/{job_id}", respond_late)
-    click_button(page, "Delete…")
+    choose(page, "Delete…")
     click_button(page, "Delete the job")
     expect(page).to_have_url(re.compile(r"/$"))
     expect(page.locator(f"a[href='/jobs/{fork['id']}']")).to_be_visible()
@@ -74,20 +75,20 @@ def test_active_and_protected_jobs_cannot_be_deleted(
     server = start_server()
     job_id = server.submit(SMALL_SPEC)
     page = visit(server.url).go(f"/jobs/{job_id}")
-    expect(page.get_by_role("button", name="Cancel…")).to_be_visible()
-    expect(page.get_by_role("button", name="Delete…")).to_have_count(0)
+    expect(command(page, "Cancel…")).to_have_count(1)
+    expect(command(page, "Delete…")).to_have_count(0)
 
-    click_button(page, "Cancel…")
+    choose(page, "Cancel…")
     click_button(page, "Cancel the job")
-    expect(page.get_by_role("button", name="Delete…")).to_be_visible()
+    expect(command(page, "Delete…")).to_have_count(1)
 
-    click_button(page, "Keep")
+    choose(page, "Keep")
     expect(page.locator("[data-labels]")).to_have_text("kept")
-    expect(page.get_by_role("button", name="Delete…")).to_have_count(0)
+    expect(command(page, "Delete…")).to_have_count(0)
     assert server.job(job_id)["kept"]
 
-    click_button(page, "Release")
-    expect(page.get_by_role("button", name="Delete…")).to_be_visible()
+    choose(page, "Release")
+    expect(command(page, "Delete…")).to_have_count(1)
     assert not server.job(job_id)["kept"]
 
 
@@ -116,12 +117,12 @@ def test_the_browser_notifies_of_the_end_of_a_job_on_request(
         if job_id == notified:
             click_button(page, "Notify me when it ends")
             expect(page.get_by_text("while this page is open")).to_be_visible()
-        expect(page.get_by_role("button", name="Cancel…")).to_be_visible()
+        expect(command(page, "Cancel…")).to_have_count(1)
         server.client.post(f"/v1/jobs/{job_id}/cancel")
         expect(page.get_by_role("status").get_by_text("cancelled", exact=True)).to_be_visible()
         page.get_by_role("link", name="All jobs").click()
     assert page.evaluate("window.notices") == [
-        "notified: cancelled; 0 iterations, no design walks in every scenario"
+        "notified: cancelled; 0 evaluations, no design walks in every scenario"
     ]
 
 
@@ -160,7 +161,7 @@ def test_the_priority_is_set_in_the_form_and_changed_on_the_page(
     assert server.job(job_id)["priority"] == 3
     expect(page.get_by_role("region", name="Job summary")).to_contain_text("priority 3")
 
-    click_button(page, "Priority…")
+    choose(page, "Priority…")
     priority = page.get_by_role("dialog").get_by_label(re.compile("^Priority"))
     change = page.get_by_role("button", name="Change priority")
     priority.fill("11")
@@ -191,7 +192,7 @@ def test_a_response_older_than_a_command_is_ignored(
             return
         answer = route.fetch()
         page = route.request.frame.page
-        click_button(page, "Keep")
+        choose(page, "Keep")
         expect(page.locator("[data-labels]")).to_have_text("kept")
         route.fulfill(response=answer)
 

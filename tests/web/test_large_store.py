@@ -158,7 +158,7 @@ def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     assert visited.received(without="after=") <= FIRST_VIEW_BYTES
     assert largest_asset(visited) < 100_000
     wait_for_iteration(page, ITERATIONS - 1)
-    page.get_by_role("link", name="Variables").click()
+    page.get_by_role("link", name="Explore").click()
     expect(page.locator("[data-selected]")).to_have_attribute(
         "data-selected", str(PARTICLES * ITERATIONS)
     )

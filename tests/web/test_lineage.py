@@ -6,10 +6,12 @@ import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Route, expect
+from playwright.sync_api import expect
 
 import gaitswarm
 from tests.examples.servers import ServerProcess
+from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import choose
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -18,7 +20,7 @@ pytestmark = pytest.mark.slow
 def test_a_fork_and_its_parent_link_to_each_other(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}")
+    page = visit(server.url).go(f"/jobs/{finished_job}/summary")
     expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
     assert page.locator("[data-forks], [data-parent]").count() == 0
 
@@ -28,21 +30,23 @@ def test_a_fork_and_its_parent_link_to_each_other(
     # The default is the iteration after the one shown.
     expect(dialog.get_by_label("First new iteration")).to_have_value("2")
     submit = dialog.get_by_role("button", name="Fork the job")
-    budget = dialog.get_by_label("Iterations in total")
-    budget.fill("2")
+    budget = dialog.get_by_label("Evaluations in total")
+    budget.fill("16")
     expect(submit).to_be_disabled()
-    budget.fill("3")
+    budget.fill("24")
     dialog.get_by_label("Name").fill("another way")
     dialog.get_by_label("Method").select_option("random")
     submit.click()
     expect(page).not_to_have_url(re.compile(finished_job))
     fork_id = page.url.rpartition("/")[2]
     server.wait_for(fork_id, "succeeded")
+    page.goto(f"{server.url}/jobs/{fork_id}/summary")
     parent = page.locator(f"[data-parent='{finished_job}']")
     expect(parent).to_contain_text("with another optimizer")
     expect(parent).to_contain_text("another search method")
     parent.get_by_role("link").click()
     expect(page).to_have_url(f"{server.url}/jobs/{finished_job}")
+    page.goto(f"{server.url}/jobs/{finished_job}/summary")
     forks = page.locator("[data-forks='1']")
     expect(forks).to_contain_text("from iteration 2")
     forks.get_by_role("link", name=fork_id).click()
@@ -53,29 +57,22 @@ def test_a_fork_and_its_parent_link_to_each_other(
     expect(row).to_contain_text(f"fork of {finished_job}")
 
 
-@pytest.mark.thorough("test_a_fork_and_its_parent_link_to_each_other")
-def test_no_button_moves_when_the_forks_are_loaded(
-    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+def test_a_job_of_many_small_iterations_can_be_forked_at_its_end(
+    server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
-    (job,) = server.client.get("/v1/jobs", params={"search": finished_job}).json()["items"]
-    lineage = {"from_iteration": 2, "changed": ["optimizer", "preference"]}
-    forks = [job | {"id": f"fork{n}", "lineage": lineage} for n in range(12)]
-    requests: list[Route] = []
-
-    def hold(route: Route) -> None:
-        requests.append(route)
-
-    visited = visit(server.url)
-    visited.page.route("**/v1/jobs?parent=*", hold)
-    with visited.page.expect_request("**/v1/jobs?parent=*"):
-        page = visited.go(f"/jobs/{finished_job}")
-    button = page.get_by_role("button", name="Extend…")
-    expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
-    before = button.bounding_box()
-
-    requests[0].fulfill(json={"items": forks, "next": None})
-    expect(page.locator("[data-forks='12']")).to_be_visible()
-    assert button.bounding_box() == before is not None
+    small = {"name": "cma-es", "particles": 5, "population": 4}
+    job_id = server.submit(SMALL_JOB | {"optimizer": small, "iterations": 3})
+    job = server.wait_for(job_id, "succeeded")
+    assert job["iterations"] > job["iterations_planned"]
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    choose(page, "Fork…")
+    dialog = page.get_by_role("dialog", name="Fork the job")
+    expect(dialog.get_by_label("First new iteration")).to_have_value(str(job["iterations"]))
+    expect(dialog.get_by_label("Evaluations in total")).to_have_value("30")
+    dialog.get_by_role("button", name="Fork the job").click()
+    expect(page).not_to_have_url(re.compile(job_id))
+    fork = server.wait_for(page.url.rpartition("/")[2], "succeeded")
+    assert fork["evaluations"] == 30
 
 
 def test_evidence_is_downloaded_and_verified(

@@ -10,6 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import choose
 from tests.web.visit import Visit, show_tab_again
 
 pytestmark = pytest.mark.slow
@@ -182,7 +183,7 @@ def test_a_job_is_labelled_and_archived(
     server = start_server()
     job_id, other = server.submit(SMALL_JOB), server.submit(SMALL_JOB | {"name": "other"})
     page = visit(server.url).go(f"/jobs/{job_id}")
-    page.get_by_role("button", name="Label").click()
+    choose(page, "Label…")
     page.get_by_label("Name", exact=True).fill("renamed")
     page.get_by_label("Tags, comma-separated").fill("thesis, wide")
     page.get_by_label("Note", exact=True).fill("P is at its bound")

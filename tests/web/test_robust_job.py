@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import ServerProcess
+from tests.web.job_page import choose
 from tests.web.test_job import fill_in, submitted
 from tests.web.visit import Visit
 
@@ -44,8 +45,10 @@ def test_a_robust_job_is_configured_with_its_cost_in_view(
     worlds.fill("2")
     page.get_by_role("button", name="Submit the job").click()
 
-    spec = server.job(submitted(page))["spec"]
+    job_id = submitted(page)
+    spec = server.job(job_id)["spec"]
     assert (spec["worlds"]["count"], spec["worlds"]["aggregate"]) == (2, "worst")
+    page.goto(f"{server.url}/jobs/{job_id}/summary")
     note = page.locator("[data-worlds='2']")
     expect(note).to_contain_text("Robust job: every design is simulated in 2 worlds")
     expect(note).to_contain_text("The utility of a scenario is the worst over all worlds.")
@@ -57,15 +60,16 @@ def test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec(
     ranges = ["friction_factor", "efficiency_factor"]
     job_id = server.submit(SMALL_SPEC | {"worlds": {"count": 2, "ranges": ranges}})
     server.wait_for(job_id, "succeeded")
-    page = visit(server.url).go(f"/jobs/{job_id}/scenarios")
+    page = visit(server.url).go(f"/jobs/{job_id}")
     table = page.get_by_role("table", name="Objectives of the winner by scenario")
     names = ["short.world-0", "short.world-1"]
     expect(table.get_by_role("rowheader")).to_have_text(names)
+    page.get_by_role("link", name="Details", exact=True).click()
     note = page.locator("[data-worlds='2']")
     expect(note).to_contain_text("(2 perturbations)")
     expect(note).to_contain_text("the mean of the worst 25 %")
 
-    page.get_by_role("link", name="Clone").click()
+    choose(page, "Clone")
     expect(page.get_by_text("2 perturbations with the ranges of the cloned job")).to_be_visible()
     page.get_by_role("button", name="Submit the job").click()
     assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
@@ -75,6 +79,6 @@ def test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec(
 def test_other_jobs_are_not_described_as_robust(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}")
+    page = visit(server.url).go(f"/jobs/{finished_job}/summary")
     expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
     assert page.locator("[data-worlds]").count() == 0

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
-from tests.web.job_page import expect_state
+from tests.web.job_page import choose, expect_state
 from tests.web.test_job import fill_in, submitted
 from tests.web.visit import Visit
 
@@ -47,7 +47,8 @@ def test_a_method_is_configured_in_the_form_and_shown_with_its_job(
     optimizer = server.job(job_id)["spec"]["optimizer"]
     assert (optimizer["name"], optimizer["crossover"]) == ("de", 0.125)
     expect(page.get_by_text(re.compile(r"\bde\b")).first).to_be_visible()
-    page.get_by_role("link", name="Spec", exact=True).click()
+    page.get_by_role("link", name="Details", exact=True).click()
+    page.get_by_role("link", name="Spec and evidence", exact=True).click()
     expect(page.get_by_role("heading", name="Search method: de")).to_be_visible()
     expect(page.locator("tr[data-setting='crossover']")).to_have_attribute("data-changed", "true")
     assert setting(page, "crossover") == ["0.125", "0.9"]
@@ -69,23 +70,23 @@ def test_the_budget_of_a_job_with_small_iterations_is_counted_in_designs(
     assert job["iterations"] > job["iterations_planned"]
     page = visit(server.url).go(f"/jobs/{job_id}")
     expect_state(page, "succeeded")
-    bar = page.get_by_role("progressbar")
-    expect(bar).to_have_attribute("aria-label", "30 of 30 designs")
-    expect(page.get_by_text(f"{job['iterations']}, at most 5 designs each")).to_be_visible()
+    evaluations = f"30 evaluations in {job['iterations']} iterations"
+    expect(page.get_by_text(evaluations)).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Convergence over"))).to_be_visible()
 
-    page.get_by_role("button", name="Extend…").click()
-    expect(page.get_by_text("30 of 30 designs are done")).to_be_visible()
-    expect(page.get_by_label(re.compile("^Iterations in total"))).to_have_attribute("min", "7")
+    choose(page, "Extend…")
+    expect(page.get_by_text("30 of 30 evaluations are done")).to_be_visible()
+    expect(page.get_by_label("Evaluations in total")).to_have_attribute("min", "31")
     page.get_by_role("button", name="Back").click()
 
+    page.get_by_role("link", name="Details", exact=True).click()
     page.get_by_role("link", name="Iterations", exact=True).click()
     rows = page.get_by_role("table", name="Iterations").locator("tbody tr")
     expect(rows).to_have_count(job["iterations"])
-    page.get_by_role("link", name="Variables", exact=True).click()
+    page.get_by_role("link", name="Explore", exact=True).click()
     expect(page.get_by_text("30 of 30 designs selected")).to_be_visible()
     page.goto("/jobs")
-    expect(page.get_by_text("30 of 30 designs").first).to_be_visible()
+    expect(page.get_by_text("30 of 30 evaluations").first).to_be_visible()
 
 
 @pytest.mark.thorough(
@@ -95,9 +96,7 @@ def test_a_search_starts_from_the_best_of_a_job(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 4(04|22)").go(f"/jobs/{finished_job}")
-    # Forks created by other tests are loaded later and move the content below.
-    page.wait_for_load_state("networkidle")
-    page.get_by_role("link", name="Start from best design").click()
+    choose(page, "Start from best design")
     expect(page.locator(f"[data-item='{finished_job}']")).to_contain_text("fitness")
     page.goto(f"{page.url},nosuchjob")
     jobs = page.get_by_label("Best designs of jobs")
@@ -119,14 +118,15 @@ def test_a_search_starts_from_the_best_of_a_job(
     assert len(start) == 3
     server.wait_for(job_id, "succeeded")
     expect_state(page, "succeeded")
-    expect(page.locator(".job-header dl div", has_text="Start designs")).to_be_visible()
+    page.get_by_role("link", name="Details", exact=True).click()
+    expect(page.locator("dl.figures div", has_text="Start designs")).to_be_visible()
     # Their evaluations are reused from the first job.
     saved = server.job(job_id)["evaluations_saved"]
     assert saved >= 3
     expect(page.get_by_text(re.compile(rf"^{saved} \("))).to_be_visible()
-    page.get_by_role("link", name="Spec", exact=True).click()
+    page.get_by_role("link", name="Spec and evidence", exact=True).click()
     rows = page.get_by_role("table", name="Start designs").locator("tbody tr")
     expect(rows).to_have_count(3)
 
-    page.get_by_role("link", name="Clone", exact=True).click()
+    choose(page, "Clone")
     expect(page.get_by_text("The search starts from 3 start designs")).to_be_visible()

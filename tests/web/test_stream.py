@@ -56,6 +56,7 @@ def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap(
     committed = server.job(job_id)["iterations"]
     wait_for_iteration(page, committed - 1)
     assert shown_iteration(page) == committed - 1
+    page.get_by_role("link", name="Details", exact=True).click()
     page.get_by_role("link", name="Iterations", exact=True).click()
     expect(page.get_by_text(f"{committed} of {committed}", exact=True)).to_be_visible()
 

@@ -43,6 +43,7 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed(
 ) -> None:
     front = front_of(server, finished_job)
     page = visit(server.url).go(f"/jobs/{finished_job}")
+    page.get_by_role("link", name="Explore").click()
     page.get_by_role("link", name="Trade-offs").click()
     shown = page.locator("[data-front]")
     expect(shown).to_have_attribute("data-front", str(front["size"]))

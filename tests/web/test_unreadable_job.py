@@ -12,6 +12,7 @@ from playwright.sync_api import expect
 
 from tests.examples.servers import Server
 from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import choose
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -33,6 +34,6 @@ def test_it_is_listed_and_its_page_shows_the_reason(
     expect(page.get_by_role("alert")).to_contain_text("schema_version")
     expect(page.get_by_role("heading", name="small")).to_be_visible()
     expect(page.get_by_role("navigation", name="Parts of the job")).to_have_count(0)
-    page.get_by_role("button", name="Cancel…").click()
+    choose(page, "Cancel…")
     page.get_by_role("button", name="Cancel the job").click()
     expect(page.get_by_role("status").filter(has_text="cancelled")).to_be_visible()

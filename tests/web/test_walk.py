@@ -111,11 +111,34 @@ def test_a_replay_can_be_scrubbed_stepped_and_played(
     expect_frame(page, recording.header["frames"] - 1, recording)
 
 
+WITHOUT_MP4 = """() => {
+    const isSupported = MediaRecorder.isTypeSupported
+    MediaRecorder.isTypeSupported = (type) => !type.includes('mp4') && isSupported(type)
+}"""
+
+
+@pytest.mark.thorough("the browser's video encoder")
+def test_a_replay_is_saved_as_mp4_where_the_browser_can(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/walk?published=A&scenario=normal-fast&t=0.5")
+    player(page)
+    page.get_by_role("button", name="Save as video").click()
+    dialog = page.get_by_role("dialog", name="Save as video")
+    dialog.get_by_label("Size").select_option(label="640 × 360")
+    dialog.get_by_label("Speed").select_option("4")
+    with page.expect_download() as download:
+        dialog.get_by_role("button", name="Record").click()
+    assert download.value.suggested_filename == "walk-normal-fast.mp4"
+    assert download.value.path().read_bytes()[4:8] == b"ftyp"
+
+
 @pytest.mark.thorough("the browser's video encoder")
 def test_a_replay_is_saved_as_a_video_with_the_chosen_size_and_speed(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/walk?published=A&scenario=normal-fast&t=0.5")
+    page.evaluate(WITHOUT_MP4)
     shown = player(page)
     with page.expect_download() as download:
         page.get_by_role("button", name="Save as picture").click()
@@ -209,6 +232,37 @@ def test_additional_presets_are_shown_to_the_end(
     expect_frame(page, last, recording)
     # The camera follows: the robot remains in view.
     painted(player(page).locator("canvas"), colourful(200))
+
+
+def test_the_robot_stays_in_view_and_its_figures_are_compared_with_the_baseline(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/walk?against=published:A")
+    canvas = player(page).locator("canvas")
+    figures = page.locator("[data-figures]")
+    expect(figures).to_contain_text("Cost of transport")
+    expect(figures).to_contain_text(re.compile("of stall"))
+    # The chosen design is judged, not the baseline.
+    job = server.job(finished_job)
+    scenario = job["spec"]["scenarios"][0]
+    published = server.client.get("/v1/controllers").json()["items"]
+    baseline = next(c["published"]["A"] for c in published if c["name"] == "fuzzy-pi")
+    ours, theirs = (
+        replay(server.client, controller="fuzzy-pi", design=design, scenario=scenario)
+        for design in (job["best"]["design"], baseline)
+    )
+    slowness = [each.header["objectives"]["reciprocal_speed"] for each in (ours, theirs)]
+    tone = "better" if slowness[0] < slowness[1] else "worse"
+    speed = figures.locator("div").filter(has_text="Speed").locator(".judged")
+    expect(speed).to_have_attribute("data-tone", tone)
+
+    page.get_by_role("region", name="Objectives", exact=True).scroll_into_view_if_needed()
+    expect(canvas).to_be_in_viewport(ratio=0.5)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.get_by_role("region", name="Objectives", exact=True).scroll_into_view_if_needed()
+    expect(canvas).to_be_in_viewport(ratio=0.5)
+    expect(page.get_by_role("button", name="Pause").or_(page.get_by_role("button", name="Play"))
+        .first).to_be_in_viewport()  # fmt: skip
 
 
 @pytest.mark.thorough("test_a_replay_can_be_scrubbed_stepped_and_played, twice")

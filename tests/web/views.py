@@ -21,10 +21,11 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "a job": {
         "job": "/jobs/{job}",
-        "scenarios": "/jobs/{job}/scenarios",
+        "job-walk": "/jobs/{job}/walk",
         "robustness": "/jobs/{job}/robustness",
         "analysis": "/jobs/{job}/analysis",
         "variables": "/jobs/{job}/variables",
+        "summary": "/jobs/{job}/summary",
         "iterations": "/jobs/{job}/iterations",
         "particles": "/jobs/{job}/iterations/1",
     },

@@ -57,6 +57,7 @@ async function mainPath(page) {
   const job = await page.evaluate(() => location.pathname.split('/')[2])
   await checkWidths(page, 'job')
 
+  await page.click('nav a', 'Details')
   await page.click('nav a', 'Iterations')
   await page.click('main tbody a')
   await page.click('main tbody a[href*="/walk"]')

@@ -23,8 +23,6 @@ const ControllerPage = lazyPage('the controller', () => import('./controller/pag
 const LINKS = [
   { page: 'jobs', href: '/jobs', label: 'Jobs' },
   { page: 'new-job', href: '/jobs/new', label: 'New job' },
-  { page: 'walk', href: '/walk', label: 'Walk' },
-  { page: 'controller', href: '/controller', label: 'Controller' },
 ] as const
 
 /** Pages, with their titles until they set their own. */
@@ -64,8 +62,6 @@ export function App() {
               {link.label}
             </a>
           ))}
-          <a href="/docs">API</a>
-          {manual && <a href="/manual">Manual</a>}
         </nav>
         <Keys />
         <ThemeToggle />
@@ -77,6 +73,14 @@ export function App() {
       ) : (
         <Main key={identity} route={route} />
       )}
+      <footer class="links-below">
+        <nav aria-label="More">
+          <a href="/walk">Walks of any design</a>
+          <a href="/controller">Controller surfaces</a>
+          <a href="/docs">API</a>
+          {manual && <a href="/manual">Manual</a>}
+        </nav>
+      </footer>
     </>
   )
 }

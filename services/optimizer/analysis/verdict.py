@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.bounds import NEAR, End, bound_at, with_wider_bounds
+from gaitswarm.services.optimizer.analysis.bounds import (
+    NEAR,
+    End,
+    WidenedView,
+    bound_at,
+    with_wider_bounds,
+)
 from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, LimitView, limit_views
 from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
@@ -103,6 +109,10 @@ class BoundView(View):
     value: float = Field(description="Value in the best design.", examples=[5990.0])
     at: End = Field(description="Bound at which it lies, within a hundredth of the range.")
     bound: float = Field(description="That bound.", examples=[6000.0])
+    widened: WidenedView | None = Field(
+        description="Wider bounds, which can be simulated together with those of the other"
+        " variables; null if there are none."
+    )
 
 
 class VerdictView(View):
@@ -173,10 +183,14 @@ def verdict(
             sentences += comparison_in_words(quantities, reference, job.gain)
         limits = limits_reached(spec, results)
         sentences += limits_in_words(limits)
-        bounds, widened = bounds_reached(spec, best.design)
+        bounds = bounds_reached(spec, best.design)
         sentences += bounds_in_words(bounds, len(spec.design_space().variables))
-        if widened:
-            ends = (f"{name}={ends}" for name, ends in widened.items())
+        ends = [
+            f"{bound.name}={bound.widened.low:.6g}:{bound.widened.high:.6g}"
+            for bound in bounds
+            if bound.widened
+        ]
+        if ends:
             widen = shlex.join([*fork, *_repeated("--bounds", ends)])
     counts = counted(quantities)
     return VerdictView(
@@ -373,25 +387,23 @@ def relaxed(constraints: Sequence[Constraint], violated: Sequence[LimitView]) ->
     return texts
 
 
-def bounds_reached(spec: JobSpec, design: Floats) -> tuple[list[BoundView], dict[str, str]]:
-    """Return variables of a design at a bound, and as LOW:HIGH the bounds that can be widened.
-
-    All of these bounds can be simulated together.
-    """
-    reached, widened, wider = [], {}, spec
+def bounds_reached(spec: JobSpec, design: Floats) -> list[BoundView]:
+    """Return variables of a design at a bound."""
+    reached, wider = [], spec
     for variable, value in zip(spec.design_space().variables, design.tolist(), strict=False):
         at = bound_at(variable, value)
         if at is None:
             continue
-        bound = variable.low if at == "low" else variable.high
-        fields = {"name": variable.name, "unit": variable.unit, "value": value}
-        reached.append(BoundView(**fields, at=at, bound=bound))
+        widened = None
         following = with_wider_bounds(wider, variable, at)
         if following is not None:
             wider = following
             (found,) = (v for v in wider.design_space().variables if v.name == variable.name)
-            widened[variable.name] = f"{found.low:.6g}:{found.high:.6g}"
-    return reached, widened
+            widened = WidenedView(low=found.low, high=found.high)
+        bound = variable.low if at == "low" else variable.high
+        fields = {"name": variable.name, "unit": variable.unit, "value": value}
+        reached.append(BoundView(**fields, at=at, bound=bound, widened=widened))
+    return reached
 
 
 def bounds_in_words(bounds: Sequence[BoundView], variables: int) -> Iterator[str]:

@@ -9,7 +9,7 @@ import { lineLabel, paintReference, type ReferenceLine } from '../charts/lines/r
 import { Check, Select } from '../components/fields/controls'
 import { Table } from '../components/table/table'
 import { referenceLabel } from '../job/gain'
-import { fittedRange } from '../job/overview/model'
+import { fittedRange } from '../job/result/model'
 import { setQuery } from '../router/navigation'
 import { flag, oneOf, useQueryValue } from '../router/query-value'
 

@@ -4,6 +4,8 @@ import { useEffect, useId, useRef, useState } from 'preact/hooks'
 
 export interface MenuItem {
   readonly label: string
+  readonly title?: string
+  readonly dangerous?: boolean
   readonly onChoose: () => void
 }
 
@@ -12,9 +14,11 @@ interface MenuProps {
   /** Subject of the commands, for screen readers only. */
   of: string
   items: readonly MenuItem[]
+  look?: string
+  disabled?: boolean
 }
 
-export function Menu({ label, of, items }: MenuProps) {
+export function Menu({ label, of, items, look = 'compact plain', disabled }: MenuProps) {
   const [open, setOpen] = useState(false)
   const box = useRef<HTMLDivElement>(null)
   const button = useRef<HTMLButtonElement>(null)
@@ -56,33 +60,35 @@ export function Menu({ label, of, items }: MenuProps) {
       <button
         ref={button}
         type="button"
-        class="compact plain"
+        class={look}
+        disabled={disabled}
         aria-haspopup="menu"
         aria-expanded={open}
-        aria-controls={open ? id : undefined}
+        aria-controls={id}
         onClick={() => setOpen(!open)}
       >
         {label} <span aria-hidden="true">▾</span>
         <span class="visually-hidden">: {of}</span>
       </button>
-      {open && (
-        <div role="menu" id={id} aria-label={`${label}: ${of}`}>
-          {items.map((item) => (
-            <button
-              key={item.label}
-              type="button"
-              role="menuitem"
-              tabIndex={-1}
-              onClick={() => {
-                close()
-                item.onChoose()
-              }}
-            >
-              {item.label}
-            </button>
-          ))}
-        </div>
-      )}
+      {/* Always present, so that the command palette finds the commands. */}
+      <div role="menu" id={id} aria-label={`${label}: ${of}`} hidden={!open}>
+        {items.map((item) => (
+          <button
+            key={item.label}
+            type="button"
+            role="menuitem"
+            class={item.dangerous ? 'danger' : undefined}
+            title={item.title}
+            tabIndex={-1}
+            onClick={() => {
+              close()
+              item.onChoose()
+            }}
+          >
+            {item.label}
+          </button>
+        ))}
+      </div>
     </div>
   )
 }

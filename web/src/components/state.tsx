@@ -2,7 +2,9 @@
 
 import type { JobState } from '../api/types'
 
-const TONES: Readonly<Record<JobState, 'muted' | 'accent' | 'good' | 'warn' | 'bad'>> = {
+type Tone = 'muted' | 'accent' | 'good' | 'warn' | 'bad'
+
+const TONES: Readonly<Record<JobState, Tone>> = {
   queued: 'muted',
   running: 'accent',
   pausing: 'warn',
@@ -12,10 +14,17 @@ const TONES: Readonly<Record<JobState, 'muted' | 'accent' | 'good' | 'warn' | 'b
   succeeded: 'good',
 }
 
-export function StateBadge({ state }: { state: JobState }) {
+export interface Outcome {
+  readonly text: string
+  readonly tone: Tone
+}
+
+/** outcome: shown in place of the state. */
+export function StateBadge({ state, outcome }: { state: JobState; outcome?: Outcome | null }) {
+  const { text, tone } = outcome ?? { text: state, tone: TONES[state] }
   return (
-    <span class="badge" data-tone={TONES[state]} data-state={state}>
-      {state}
+    <span class="badge" data-tone={tone} data-state={state}>
+      {text}
     </span>
   )
 }

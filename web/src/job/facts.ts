@@ -29,7 +29,7 @@ export function isRunning({ state }: WithState): boolean {
   return state === 'running' || state === 'pausing'
 }
 
-/** `running 3/6`, or the final state. followed: iterations received from the stream. */
+/** `running 24/48`, in evaluations, or the final state. followed: iterations from the stream. */
 export function progressInWords(
   job: Counts & WithState,
   followed: readonly Iteration[] = [],
@@ -38,41 +38,24 @@ export function progressInWords(
   return hasEnded(job) ? job.state : `${job.state} ${done}/${planned}`
 }
 
+/** Evaluations done, and planned. */
 export interface Spent {
   readonly done: number
   readonly planned: number
-  /** `designs` if some iterations were smaller than planned, so that there may be more of them. */
-  readonly unit: 'iterations' | 'designs'
 }
 
-export type Counts = Pick<
-  JobSummary,
-  'iterations' | 'evaluations' | 'particles' | 'iterations_planned' | 'evaluations_planned'
->
+export type Counts = Pick<JobSummary, 'iterations' | 'evaluations' | 'evaluations_planned'>
 
 /** followed: iterations received from the stream, which may be ahead of the job. */
 export function budgetSpent(job: Counts, followed: readonly Iteration[] = []): Spent {
   const ahead = followed.length > job.iterations
-  const iterations = ahead ? followed.length : job.iterations
-  const evaluations = ahead ? designsIn(followed) : job.evaluations
-  const whole = iterations <= job.iterations_planned && evaluations === iterations * job.particles
-  return job.particles === 0 || whole
-    ? { done: iterations, planned: job.iterations_planned, unit: 'iterations' }
-    : { done: evaluations, planned: job.evaluations_planned, unit: 'designs' }
+  const done = ahead ? followed.reduce((sum, { designs }) => sum + designs, 0) : job.evaluations
+  return { done, planned: job.evaluations_planned }
 }
 
-/** Budget spent in full iterations, the lower limit of an extension. */
-export function iterationsSpent(job: Counts): number {
-  return job.particles === 0 ? job.iterations : Math.ceil(job.evaluations / job.particles)
-}
-
-/** `12 of 25`, without the unit. */
+/** `12 of 25 evaluations`. */
 export function spentInWords({ done, planned }: Spent): string {
-  return `${formatCount(done)} of ${formatCount(planned)}`
-}
-
-function designsIn(iterations: readonly Iteration[]): number {
-  return iterations.reduce((sum, { designs }) => sum + designs, 0)
+  return `${formatCount(done)} of ${formatCount(planned)} evaluations`
 }
 
 /** Unit of a job's fitness: dimensionless, except for identification, which averages errors in current. */

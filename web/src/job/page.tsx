@@ -1,73 +1,79 @@
 /** Job page: header, commands and tabs, updated live. */
 
 import type { FunctionComponent } from 'preact'
+import { useEffect } from 'preact/hooks'
 import { isReadable } from '../api/jobs'
 import type { Job } from '../api/types'
+import { EmptyCard } from '../components/card'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
 import { lazyPage } from '../router/lazy-page'
-import { usePlace } from '../router/navigation'
+import { navigate, usePlace } from '../router/navigation'
 import { jobPath, withQuery } from '../router/routes'
 import { SHARED } from './designs/particles'
-import { caseWords, progressInWords } from './facts'
+import { progressInWords } from './facts'
 import { useGain } from './gain'
 import { JobHeader } from './header/header'
 import { type LiveJob, useJob } from './live/use-job'
-import { OverviewPanel } from './overview/panel'
+import { ResultPanel } from './result/panel'
 import './job.css'
 
 export interface PanelProps {
   readonly live: LiveJob
   readonly job: Job
   readonly gain: ReturnType<typeof useGain>
-  /** Part of the path after the tab; undefined for none. */
+  /** Part of the path after the section; undefined for none. */
   readonly detail: string | undefined
 }
 
-interface Part {
+interface Section {
   readonly label: string
   /** Kinds of jobs that have it; all if empty. */
   readonly kinds: readonly Job['kind'][]
   readonly Panel: FunctionComponent<PanelProps>
 }
 
-function part(
+function section(
   label: string,
   load: () => Promise<{ default: FunctionComponent<PanelProps> }>,
   ...kinds: Job['kind'][]
-): Part {
+): Section {
   return { label, kinds, Panel: lazyPage(`the ${label.toLowerCase()}`, load) }
 }
 
-// A certificate has no best world to show by scenario, and searches nothing.
-const SEARCHES = ['tuning', 'identification', 'calibration'] as const
+const FITS = ['identification', 'calibration'] as const
 
-const PARTS: Readonly<Record<string, Part>> = {
-  '': { label: 'Overview', kinds: [], Panel: OverviewPanel },
-  certificate: part('Certificate', () => import('./certificate/panel'), 'certificate'),
-  candidates: part('Preferences', () => import('./candidates/panel'), 'preferences'),
-  targets: part('Targets', () => import('./targets/panel'), 'calibration'),
-  scenarios: part('Scenarios', () => import('./scenarios/panel'), ...SEARCHES),
-  parameters: part(
-    'Parameters',
-    () => import('./parameters/panel'),
-    'identification',
-    'calibration',
-  ),
-  robustness: part('Robustness', () => import('./robustness/panel'), 'tuning'),
-  analysis: part('Analysis', () => import('./analysis/panel'), ...SEARCHES),
-  variables: part('Variables', () => import('./variables/panel')),
-  iterations: part('Iterations', () => import('./iterations/panel')),
-  'trade-offs': part('Trade-offs', () => import('./trade-offs/panel'), 'tuning'),
-  preferences: part('What if', () => import('./preferences/panel'), 'tuning'),
-  firmware: part('Firmware', () => import('./firmware/panel'), 'tuning'),
-  activity: part('Activity', () => import('./activity/panel')),
-  reproduce: part('Spec', () => import('./reproduce/panel')),
+/** By name in the path. A certificate searches nothing and has no best world to show. */
+const SECTIONS: Readonly<Record<string, Section>> = {
+  '': { label: 'Result', kinds: [], Panel: ResultPanel },
+  walk: section('Walk', () => import('./walk/panel'), 'tuning'),
+  parameters: section('Parameters', () => import('./parameters/panel'), ...FITS),
+  variables: section('Variables', () => import('./variables/panel')),
+  'trade-offs': section('Trade-offs', () => import('./trade-offs/panel'), 'tuning'),
+  preferences: section('What if', () => import('./preferences/panel'), 'tuning'),
+  analysis: section('Importance', () => import('./analysis/panel'), 'tuning', ...FITS),
+  robustness: section('Robustness', () => import('./robustness/panel'), 'tuning'),
+  summary: section('Summary', () => import('./summary/panel')),
+  iterations: section('Iterations', () => import('./iterations/panel')),
+  activity: section('Activity', () => import('./activity/panel')),
+  firmware: section('Firmware', () => import('./firmware/panel'), 'tuning'),
+  reproduce: section('Spec and evidence', () => import('./reproduce/panel')),
 }
 
-function hasPart(job: Job, tab: string): boolean {
-  const kinds = PARTS[tab]?.kinds
+const TABS: readonly (readonly [label: string, ...sections: string[]])[] = [
+  ['Result', ''],
+  ['Walk', 'walk'],
+  ['Explore', 'parameters', 'variables', 'trade-offs', 'preferences', 'analysis'],
+  ['Robustness', 'robustness'],
+  ['Details', 'summary', 'iterations', 'activity', 'firmware', 'reproduce'],
+]
+
+/** Former sections that are parts of the result. */
+const MOVED = ['overview', 'scenarios', 'targets', 'certificate', 'candidates']
+
+function hasSection(job: Job, name: string): boolean {
+  const kinds = SECTIONS[name]?.kinds
   return kinds?.length === 0 || kinds?.includes(job.kind) === true
 }
 
@@ -80,12 +86,20 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
   const live = useJob(id)
   const { job, followed } = live
   const gain = useGain(job)
+  useFormerAddress(id, tab)
   if (job === null) {
     return (
       <div class="stack">
         <Breadcrumbs crumbs={[ALL_JOBS]} here={`Job ${id}`} />
         {live.error === null ? (
           <Loading what="the job" />
+        ) : live.missing ? (
+          <EmptyCard title="There is no such job">
+            <p>
+              Job {id} was deleted or belongs to another server. Look for it in the{' '}
+              <a href="/jobs">list of jobs</a>.
+            </p>
+          </EmptyCard>
         ) : (
           <>
             <h1>Job {id}</h1>
@@ -96,10 +110,10 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
     )
   }
   const name = job.name || job.id
-  const [section, detail] = tab.split('/')
+  const [part, detail] = tab.split('/')
   const crumbs: Crumb[] = [ALL_JOBS]
-  if (tab !== '') crumbs.push([name, jobPath(job.id)])
-  if (detail) crumbs.push([capitalized(section), jobPath(job.id, section)])
+  if (part !== '') crumbs.push([name, jobPath(job.id)])
+  if (detail) crumbs.push([capitalized(part), jobPath(job.id, part)])
   const last = followed.iterations.at(-1)
   return (
     <div
@@ -110,41 +124,65 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
     >
       <Breadcrumbs
         crumbs={crumbs}
-        here={detail || (section !== '' && PARTS[section]?.label) || name}
+        here={detail || (part !== '' && SECTIONS[part]?.label) || name}
         title={[name, progressInWords(job, followed.iterations)]}
       />
-      <JobHeader live={live} job={job} gain={gain} />
+      <JobHeader live={live} job={job} />
       {isReadable(job) && !live.held && (
-        <Parts live={live} job={job} section={section} detail={detail} gain={gain} />
+        <Sections live={live} job={job} part={part} detail={detail} gain={gain} />
       )}
     </div>
   )
 }
 
-function Parts({ section, ...props }: PanelProps & { section: string }) {
+/** Replace an address of former tabs: `?tab=variables`, `/scenarios`. */
+function useFormerAddress(id: string, tab: string): void {
+  const { query } = usePlace()
+  const requested = query.get('tab') ?? tab
+  const isFormer = requested !== tab || MOVED.includes(tab)
+  useEffect(() => {
+    if (!isFormer) return
+    const rest = Object.fromEntries([...query].filter(([name]) => name !== 'tab'))
+    const part = MOVED.includes(requested) ? '' : requested
+    navigate(withQuery(jobPath(id, part), rest), { replace: true })
+  }, [isFormer])
+}
+
+function Sections({ part, ...props }: PanelProps & { part: string }) {
   const { job } = props
   const { query } = usePlace()
   const shared = Object.fromEntries(SHARED.map((name) => [name, query.get(name) ?? undefined]))
-  const { Panel } = PARTS[section] ?? PARTS['']
+  const { Panel } = SECTIONS[part] ?? SECTIONS['']
+  const link = (name: string, label: string, current: boolean) => (
+    <a
+      key={name}
+      href={withQuery(jobPath(job.id, name), shared)}
+      aria-current={current ? 'page' : undefined}
+    >
+      {label}
+    </a>
+  )
+  const tabs = TABS.map(([label, ...names]) => ({
+    label,
+    names: names.filter((name) => hasSection(job, name)),
+  })).filter(({ names }) => names.length > 0)
+  const open = tabs.find(({ names }) => names.includes(part))
   return (
     <>
       <nav class="tabs" aria-label="Parts of the job">
-        {Object.entries(PARTS)
-          .filter(([tab]) => hasPart(job, tab))
-          .map(([tab, { label }]) => (
-            <a
-              key={tab}
-              href={withQuery(jobPath(job.id, tab), shared)}
-              aria-current={tab === section ? 'page' : undefined}
-            >
-              {tab === 'scenarios' ? capitalized(caseWords(job.kind).items) : label}
-            </a>
-          ))}
+        {tabs.map(({ label, names }) => link(names[0], label, names.includes(part)))}
       </nav>
-      {hasPart(job, section) ? (
+      {open && open.names.length > 1 && (
+        <nav class="sections" aria-label={open.label}>
+          {open.names.map((name) => link(name, SECTIONS[name].label, name === part))}
+        </nav>
+      )}
+      {open ? (
         <Panel {...props} />
       ) : (
-        <ErrorNotice what="Page not found." error="Choose one of the tabs above." />
+        !MOVED.includes(part) && (
+          <ErrorNotice what="Page not found." error="Choose one of the tabs above." />
+        )
       )}
     </>
   )

@@ -36,7 +36,7 @@ export function jobColumns(
     { key: 'name', sortable: true, header: true, cell: (job) => <NameCell job={job} /> },
     { key: 'state', sortable: true, cell: ({ state }) => <StateBadge state={state} /> },
     { key: 'priority', sortable: true, numeric: true, minor: true, cell: (job) => job.priority },
-    { key: 'iterations', sortable: true, cell: (job) => <ProgressCell job={job} /> },
+    { key: 'evaluations', sortable: true, cell: (job) => <ProgressCell job={job} /> },
     {
       key: 'fitness',
       label: 'Best fitness',
@@ -118,11 +118,10 @@ function NameCell({ job }: { job: JobSummary }) {
 function ProgressCell({ job }: { job: JobSummary }) {
   const spent = budgetSpent(job)
   const text = spentInWords(spent)
-  const label = `${text} ${spent.unit}`
   return (
     <div class="job-progress">
-      <span>{spent.unit === 'iterations' ? text : label}</span>
-      <Progress done={spent.done} planned={spent.planned} label={label} state={job.state} />
+      <span>{text}</span>
+      <Progress {...spent} label={text} state={job.state} />
     </div>
   )
 }

@@ -193,7 +193,7 @@ function entriesOfPage(): readonly Entry[] {
       return { key: `${kind} ${k}`, label, kind, run: () => element.click() }
     })
   return [
-    ...offered('main .actions > .row > :is(button:not(:disabled), a)', 'this job'),
-    ...offered('main nav.tabs > a', 'part of this job'),
+    ...offered('main .actions > .row > button, main .actions [role=menuitem]', 'this job'),
+    ...offered('main :is(nav.tabs, nav.sections) > a', 'part of this job'),
   ]
 }

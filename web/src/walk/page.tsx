@@ -34,9 +34,11 @@ interface WalkProps {
   source: DesignSource
   against: DesignSource | null
   query: URLSearchParams
+  embedded?: boolean
 }
 
-function Walk({ source, against, query }: WalkProps) {
+/** embedded: in the page of its job, whose best design is shown. */
+export function Walk({ source, against, query, embedded = false }: WalkProps) {
   const rate = RATES.find((candidate) => String(candidate) === query.get('rate')) ?? DEFAULT_RATE
   const presets = useResource('scenarios', (signal) => get('/v1/scenarios', { signal }))
   const first = useResource(wordOf(source), (signal) => resolveDesign(source, signal))
@@ -57,19 +59,23 @@ function Walk({ source, against, query }: WalkProps) {
   const compared = second.data ? [`compared with ${second.data.label}`] : []
   return (
     <div class="stack">
-      <DesignHeading
-        title="Walk"
-        path="/walk"
-        design={first.data}
-        details={[`scenario ${requested}`, ...compared]}
-      />
-      <div class="card walk-choice">
-        <DesignPicker
-          label="Design"
-          chosen={first.data?.source ?? source}
-          chosenLabel={first.data?.label ?? 'This design'}
-          onChoose={(chosen) => setQuery(queryOf(chosen!))}
+      {!embedded && (
+        <DesignHeading
+          title="Walk"
+          path="/walk"
+          design={first.data}
+          details={[`scenario ${requested}`, ...compared]}
         />
+      )}
+      <div class="walk-choice">
+        {!embedded && (
+          <DesignPicker
+            label="Design"
+            chosen={first.data?.source ?? source}
+            chosenLabel={first.data?.label ?? 'This design'}
+            onChoose={(chosen) => setQuery(queryOf(chosen!))}
+          />
+        )}
         <ScenarioPicker jobScenarios={jobScenarios} presets={listed} chosen={requested} />
         <DesignPicker
           label="Compare with"
@@ -84,6 +90,7 @@ function Walk({ source, against, query }: WalkProps) {
           source={first.data?.source ?? source}
           path={first.data && '/controller'}
           label="Show controller"
+          withJob={!embedded}
         />
       </div>
       {failed?.error && (
@@ -120,13 +127,13 @@ function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
     <>
       <FailureNotices walks={walks} />
       {shown.length > 0 && (
-        <>
+        <div class="walk-workspace">
           <Player
             {...{ walks: shown, playback, options, onOptions, camera }}
             onCamera={setCamera}
           />
           <WalkPlots walks={shown} all={walks} playback={playback} />
-        </>
+        </div>
       )}
     </>
   )

@@ -59,13 +59,14 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
       cell: (name: string) => formatNumber(objectiveOf(name, k)),
     })),
     {
-      key: 'second vs. first',
+      key: 'difference',
+      label: `vs. ${walks[1]?.label}`,
       numeric: true,
       cell: (name) => difference(objective_units[name], objectiveOf(name, 0), objectiveOf(name, 1)),
     },
   ]
   return (
-    <Card title="Objectives" note="Lower is better." class={comparing ? 'wide' : ''}>
+    <Card title="Objectives" note="Lower is better.">
       <Table
         caption="Objectives of the walk"
         rows={Object.keys(objectives)}
@@ -75,12 +76,12 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
   )
 }
 
-/** In percent, or in the objective's unit if it can be negative. */
-function difference(unit: string, first: number | null, second: number | null): string {
-  if (first === null || second === null) return NONE
-  return first > 0 && second > 0
-    ? change(100 * (second / first - 1), '%')
-    : change(second - first, unit)
+/** From the baseline, in percent, or in the objective's unit if it can be negative. */
+function difference(unit: string, value: number | null, baseline: number | null): string {
+  if (value === null || baseline === null) return NONE
+  return value > 0 && baseline > 0
+    ? change(100 * (value / baseline - 1), '%')
+    : change(value - baseline, unit)
 }
 
 /** How much of a failed walk can be shown. */

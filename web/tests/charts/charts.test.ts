@@ -9,7 +9,6 @@ import {
 } from '../../src/charts/parallel/parallel-model'
 import { linearTicks, logRange, logTicks, shareOf, valueAt } from '../../src/charts/scale'
 import { decodeParticles } from '../../src/job/designs/particles'
-import { grouped } from '../../src/job/overview/model'
 
 describe('a logarithmic axis', () => {
   test('has round numbers within a decade', () => {
@@ -136,20 +135,4 @@ test('particles are decoded from the API format', () => {
   expect(particles).toMatchObject({ rows: 3, total: 9 })
   expect([...particles.columns[0].values]).toEqual([0, 0, 1])
   expect([...particles.columns[1].values]).toEqual([21.5, Number.NaN, 20.25])
-})
-
-test('many iterations are grouped into strips of mean quantiles', () => {
-  const items = [1, 2, 3, 4, null].map((best, index) => ({
-    index,
-    fitness: [best, best === null ? null : best * 10],
-    mean: null,
-    failed: 0,
-    diversity: 0,
-  }))
-  expect(grouped(items, 10)).toHaveLength(5)
-  expect(grouped(items, 3)).toEqual([
-    { from: 0, to: 1, middle: 0.5, fitness: [1.5, 15] },
-    { from: 2, to: 3, middle: 2.5, fitness: [3.5, 35] },
-    { from: 4, to: 4, middle: 4, fitness: [null, null] },
-  ])
 })

@@ -29,8 +29,8 @@ test('progress is shown until a job has ended', () => {
     evaluations_planned: 24,
   }
   const followed = Array.from({ length: 5 }, () => ({ designs: 4 }) as Iteration)
-  expect(progressInWords({ ...job, state: 'running' })).toBe('running 3/6')
-  expect(progressInWords({ ...job, state: 'running' }, followed)).toBe('running 5/6')
-  expect(progressInWords({ ...job, state: 'paused' })).toBe('paused 3/6')
+  expect(progressInWords({ ...job, state: 'running' })).toBe('running 12/24')
+  expect(progressInWords({ ...job, state: 'running' }, followed)).toBe('running 20/24')
+  expect(progressInWords({ ...job, state: 'paused' })).toBe('paused 12/24')
   expect(progressInWords({ ...job, state: 'failed' })).toBe('failed')
 })

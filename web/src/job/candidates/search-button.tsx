@@ -13,7 +13,7 @@ export function SearchButton({ job }: { job: Job }) {
   const submit = () => {
     setSending(true)
     post('/v1/jobs', { body: searchAround(job) })
-      .then(({ id }) => navigate(jobPath(id, 'candidates')), setError)
+      .then(({ id }) => navigate(jobPath(id)), setError)
       .finally(() => setSending(false))
   }
   return (

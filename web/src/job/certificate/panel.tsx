@@ -1,7 +1,6 @@
 /** Robustness of a design over many worlds: failures, distribution of utility, worst worlds. */
 
-import { get } from '../../api/client'
-import { usePolling, useResource } from '../../api/resource'
+import { useResource, useSlowly } from '../../api/resource'
 import type {
   Certificate,
   Compared,
@@ -14,24 +13,23 @@ import type {
 } from '../../api/types'
 import { Card, EmptyCard, Loaded } from '../../components/card'
 import { type Column, Table } from '../../components/table/table'
-import { change, formatCount, formatNumber, percent, withUnit } from '../../format/number'
+import { change, formatNumber, withUnit } from '../../format/number'
 import { inWords } from '../../format/words'
 import { withQuery } from '../../router/routes'
-import { isRunning } from '../facts'
+import { loadCertificate } from '../outcome'
+import { Failures } from './failures'
 
 const RENEW_MS = 15_000
 
 export default function CertificatePanel({ job }: { job: Job }) {
   // The first evaluation is the nominal world.
   const exists = job.evaluations >= 2
-  const certificate = useResource(exists ? job.id : null, (signal) =>
-    get('/v1/jobs/{job_id}/certificate', {
-      path: { job_id: job.id },
-      query: { most: 20 },
-      signal,
-    }),
+  const evaluations = useSlowly(job.evaluations, RENEW_MS)
+  const certificate = useResource(
+    exists ? `${job.id} ${evaluations}` : null,
+    () => loadCertificate({ id: job.id, evaluations }),
+    { keep: true },
   )
-  usePolling(certificate.reload, RENEW_MS, isRunning(job))
   if (!exists) {
     return (
       <EmptyCard title="No world yet">
@@ -44,12 +42,17 @@ export default function CertificatePanel({ job }: { job: Job }) {
       <Loaded resource={certificate} what="the certificate">
         {(data) => (
           <>
+            <section class="card headline-card" aria-label="Verdict">
+              <Failures certificate={data} id={job.id} />
+            </section>
             <Scenarios certificate={data} />
             {Object.entries(data.engines ?? {}).map(([name, engine]) => (
               <OtherEngine key={name} name={name} engine={engine} objectives={job.objectives} />
             ))}
-            <Worlds job={job} worlds={data.worst} />
-            <Influences influences={data.influences} />
+            <div class="grid">
+              <Worlds job={job} worlds={data.worst} />
+              <Influences influences={data.influences} />
+            </div>
           </>
         )}
       </Loaded>
@@ -65,7 +68,7 @@ interface Row {
 }
 
 function Scenarios({ certificate }: { certificate: Certificate }) {
-  const { failed, fell, fitness } = certificate
+  const { failed, fitness } = certificate
   const rows = Object.entries(certificate.scenarios).map(
     ([name, { held_out: heldOut, failed, utility: spread }]): Row => ({
       name,
@@ -75,13 +78,7 @@ function Scenarios({ certificate }: { certificate: Certificate }) {
     }),
   )
   return (
-    <Card title={<>Failures in {formatCount(certificate.worlds)} worlds</>}>
-      <p data-failed={failed.count} data-fell={fell.count}>
-        A simulation failed in <strong>{formatCount(failed.count)}</strong> of them
-        {failed.count > 0 && <>; the robot fell in {formatCount(fell.count)}</>}. The probability of
-        a failure in such a world is {percent(failed.low, 2)} to {percent(failed.high, 2)} (exact
-        95&nbsp;% interval).
-      </p>
+    <Card title="Utility by scenario">
       <Table
         caption="Utility by scenario"
         rows={[...rows, { name: 'all', heldOut: false, failed, spread: fitness }]}

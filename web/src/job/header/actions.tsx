@@ -6,12 +6,13 @@ import { isReadable } from '../../api/jobs'
 import type { StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
 import { ErrorNotice } from '../../components/feedback'
+import { Menu, type MenuItem } from '../../components/menu'
 import { formatCount } from '../../format/number'
 import { navigate } from '../../router/navigation'
 import { withQuery } from '../../router/routes'
-import { canFork, ExtendDialog, ForkButton, LabelDialog, PriorityDialog } from './dialogs'
+import { canFork, ExtendDialog, ForkDialog, LabelDialog, PriorityDialog } from './dialogs'
 
-type Dialog = 'cancel' | 'delete' | 'extend' | 'label' | 'priority' | null
+type Dialog = 'cancel' | 'delete' | 'extend' | 'fork' | 'label' | 'priority' | null
 
 interface JobActionsProps {
   job: StoredJob
@@ -43,36 +44,48 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
   }
   const path = { job_id: job.id }
   const can = (name: string) => name in job.links
-  const button = (label: string, onClick: () => void, look = '', title?: string) => (
-    <button type="button" class={look} disabled={busy} title={title} onClick={onClick}>
+  const dialogProps = { job, onCommand: command, onDismiss: () => setDialog(null) }
+  const clone = (query = {}) => navigate(withQuery('/jobs/new', { clone: job.id, ...query }))
+  const readable = isReadable(job)
+  const canStart = readable && job.kind === 'tuning' && job.best_fitness !== null
+  const items: readonly (MenuItem | false)[] = [
+    canFork(job, job.iterations) && { label: 'Fork…', onChoose: () => setDialog('fork') },
+    can('extend') && { label: 'Extend…', onChoose: () => setDialog('extend') },
+    canStart && { label: 'Start from best design', onChoose: () => clone({ start: job.id }) },
+    readable && { label: 'Clone', onChoose: clone },
+    { label: 'Label…', onChoose: () => setDialog('label') },
+    can('priority') && { label: 'Priority…', onChoose: () => setDialog('priority') },
+    job.kept
+      ? {
+          label: 'Release',
+          title: 'Allow deletion',
+          onChoose: () => command(() => release(job.id)),
+        }
+      : {
+          label: 'Keep',
+          title: 'Protect from deletion',
+          onChoose: () => command(() => put(KEEP, { path })),
+        },
+    can('cancel') && { label: 'Cancel…', dangerous: true, onChoose: () => setDialog('cancel') },
+    can('delete') && { label: 'Delete…', dangerous: true, onChoose: () => setDialog('delete') },
+  ]
+  const main = (label: string, look: string, onClick: () => void) => (
+    <button type="button" class={look} disabled={busy} onClick={onClick}>
       {label}
     </button>
   )
-  const dialogProps = { job, onCommand: command, onDismiss: () => setDialog(null) }
   return (
-    <div class="stack-tight actions">
+    <div class="actions">
       <div class="row">
-        {can('pause') && button('Pause', () => command(() => post(PAUSE, { path })))}
-        {can('resume') && button('Resume', () => command(() => post(RESUME, { path })), 'primary')}
-        {can('extend') && button('Extend…', () => setDialog('extend'))}
-        {can('priority') && button('Priority…', () => setDialog('priority'))}
-        {button('Label…', () => setDialog('label'))}
-        {job.kept
-          ? button('Release', () => command(() => release(job.id)), '', 'Allow deletion')
-          : button('Keep', () => command(() => put(KEEP, { path })), '', 'Protect from deletion')}
-        {canFork(job, job.iterations) && <ForkButton job={job} from={job.iterations} />}
-        {isReadable(job) && (
-          <a class="button" href={withQuery('/jobs/new', { clone: job.id })}>
-            Clone
-          </a>
-        )}
-        {isReadable(job) && job.kind === 'tuning' && job.best_fitness !== null && (
-          <a class="button" href={withQuery('/jobs/new', { clone: job.id, start: job.id })}>
-            Start from best design
-          </a>
-        )}
-        {can('cancel') && button('Cancel…', () => setDialog('cancel'), 'danger')}
-        {can('delete') && button('Delete…', () => setDialog('delete'), 'danger')}
+        {can('pause') && main('Pause', '', () => command(() => post(PAUSE, { path })))}
+        {can('resume') && main('Resume', 'primary', () => command(() => post(RESUME, { path })))}
+        <Menu
+          label="Actions"
+          of={job.name || job.id}
+          look=""
+          disabled={busy}
+          items={items.filter((item) => item !== false)}
+        />
       </div>
       {error !== null && <ErrorNotice what="The command failed." error={error} />}
       {dialog === 'cancel' && (
@@ -84,8 +97,9 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
           onDismiss={dialogProps.onDismiss}
         >
           <p>
-            A cancelled job cannot be resumed. The {formatCount(job.iterations)} committed
-            iterations are kept; the current one is lost. To continue later, pause the job instead.
+            A cancelled job cannot be resumed. The {formatCount(job.evaluations)} committed
+            evaluations are kept; the current iteration is lost. To continue later, pause the job
+            instead.
           </p>
         </ConfirmDialog>
       )}
@@ -98,11 +112,14 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
           onDismiss={dialogProps.onDismiss}
         >
           <p>
-            {formatCount(job.iterations)} iterations with {formatCount(job.evaluations)} evaluated
-            designs are permanently lost. Forks of the job keep their copies but lose their parent;
+            {formatCount(job.evaluations)} evaluations in {formatCount(job.iterations)} iterations
+            are permanently lost. Forks of the job keep their copies but lose their parent;
             certificates of its designs are separate jobs and remain.
           </p>
         </ConfirmDialog>
+      )}
+      {dialog === 'fork' && (
+        <ForkDialog job={job} from={job.iterations} onDismiss={dialogProps.onDismiss} />
       )}
       {dialog === 'priority' && <PriorityDialog {...dialogProps} />}
       {dialog === 'label' && <LabelDialog {...dialogProps} />}

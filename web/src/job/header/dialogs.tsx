@@ -15,7 +15,6 @@ import {
   budgetSpent,
   HIGHEST,
   isPriority,
-  iterationsSpent,
   LOWEST,
   PRIORITY_ERROR,
   PRIORITY_HELP,
@@ -58,35 +57,43 @@ export function PriorityDialog({ job, onCommand, onDismiss }: DialogProps) {
 }
 
 export function ExtendDialog({ job, onCommand, onDismiss }: DialogProps) {
-  const [budget, setBudget] = useState(String(job.iterations_planned + 25))
-  const [spent, least] = [budgetSpent(job), iterationsSpent(job)]
-  const iterations = Number(budget)
-  const valid = Number.isInteger(iterations) && iterations > least
-  const options = { path: { job_id: job.id }, body: { iterations } }
+  const budget = useBudget(job, job.evaluations)
+  const options = { path: { job_id: job.id }, body: { iterations: budget.iterations } }
   return (
     <ConfirmDialog
       title="Extend the budget"
-      confirm={`Run ${valid ? formatCount(iterations) : '…'} iterations in total`}
-      disabled={!valid}
+      confirm={`Run ${budget.valid ? formatCount(budget.evaluations) : '…'} evaluations in total`}
+      disabled={!budget.valid}
       onConfirm={() => onCommand(() => post('/v1/jobs/{job_id}/extend', options))}
       onDismiss={onDismiss}
     >
-      <p>
-        {spentInWords(spent)} {spent.unit} are done.
-        {spent.unit === 'designs' &&
-          ` The budget counts iterations of ${formatCount(job.particles)} designs each.`}
-      </p>
-      <TextField
-        label="Iterations in total"
-        type="number"
-        min={least + 1}
-        step={1}
-        value={budget}
-        error={valid ? undefined : `must be an integer above ${formatCount(least)}`}
-        onChange={setBudget}
-      />
+      <p>{spentInWords(budgetSpent(job))} are done.</p>
+      {budget.field}
     </ConfirmDialog>
   )
+}
+
+/** Budget of a job that goes on, in evaluations; the API counts iterations of full size. */
+function useBudget(job: StoredJob, done: number) {
+  const { particles, evaluations_planned: planned } = job
+  const [text, setText] = useState('')
+  const usual = planned > done ? planned : done + Math.max(planned, particles)
+  const evaluations = Number(text === '' ? usual : text)
+  const iterations = Math.ceil(evaluations / particles)
+  const valid = Number.isInteger(evaluations) && evaluations > done
+  const field = (
+    <TextField
+      label="Evaluations in total"
+      type="number"
+      min={done + 1}
+      step={1}
+      value={text === '' ? String(usual) : text}
+      hint={`in iterations of ${formatCount(particles)}`}
+      error={valid ? undefined : `must be an integer above ${formatCount(done)}`}
+      onChange={setText}
+    />
+  )
+  return { evaluations: iterations * particles, iterations, valid, field }
 }
 
 export function LabelDialog({ job, onCommand, onDismiss }: DialogProps) {
@@ -144,9 +151,8 @@ export function ForkButton({ compact = false, ...props }: ForkProps & { compact?
 
 const AS_PARENT = 'same as parent'
 
-function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: () => void }) {
+export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: () => void }) {
   const [first, setFirst] = useState(String(from))
-  const [budget, setBudget] = useState(String(job.iterations_planned))
   const [name, setName] = useState(job.name)
   const [preference, setPreference] = useState(AS_PARENT)
   const [method, setMethod] = useState(AS_PARENT)
@@ -154,9 +160,12 @@ function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: () => voi
   const [error, setError] = useState<unknown>(null)
   const preferences = useResource('preferences', (signal) => get('/v1/preferences', { signal }))
   const optimizers = useResource('optimizers', (signal) => get('/v1/optimizers', { signal }))
-  const [start, iterations] = [Number(first), Number(budget)]
+  const start = Number(first)
   const startValid = Number.isInteger(start) && start >= 1 && start <= job.iterations
-  const valid = startValid && Number.isInteger(iterations) && iterations > start
+  // Iterations may be smaller than planned; their mean size is exact for all of them.
+  const copied = startValid ? Math.round((job.evaluations * start) / job.iterations) : 0
+  const budget = useBudget(job, copied)
+  const valid = startValid && budget.valid
   const last = formatCount(job.iterations)
   const changed = (value: string) => (value === AS_PARENT ? null : value)
   const fork = () => {
@@ -164,7 +173,7 @@ function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: () => voi
     setError(null)
     const body = {
       from_iteration: start,
-      iterations,
+      iterations: budget.iterations,
       name,
       start_count: 5,
       accept_changes: false,
@@ -190,17 +199,13 @@ function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: () => voi
       <TextField
         label="First new iteration"
         value={first}
-        hint={startValid && `1 to ${last}; earlier ones are copied`}
+        hint={
+          startValid && `1 to ${last}; the ${formatCount(copied)} evaluations before it are copied`
+        }
         error={startValid ? undefined : `must be an integer from 1 to ${last}`}
         onChange={setFirst}
       />
-      <TextField
-        label="Iterations in total"
-        value={budget}
-        hint="including the copied ones"
-        error={valid || !startValid ? undefined : `must be an integer above ${formatCount(start)}`}
-        onChange={setBudget}
-      />
+      {budget.field}
       <TextField label="Name" value={name} onChange={setName} />
       {job.kind === 'tuning' && (
         <ChoiceField

@@ -60,7 +60,7 @@ export function noticeState(permission: NotificationPermission | 'missing', on: 
 }
 
 export function endInWords(
-  job: Pick<StoredJob, 'id' | 'name' | 'state' | 'iterations' | 'best_fitness' | 'error'>,
+  job: Pick<StoredJob, 'id' | 'name' | 'state' | 'evaluations' | 'best_fitness' | 'error'>,
 ): { readonly title: string; readonly body: string } {
   const title = `${job.name || job.id}: ${job.state}`
   if (job.state === 'failed') return { title, body: job.error ?? 'No reason given.' }
@@ -68,5 +68,5 @@ export function endInWords(
     job.best_fitness === null
       ? 'no design walks in every scenario'
       : `best fitness ${formatNumber(job.best_fitness, 5)}`
-  return { title, body: `${formatCount(job.iterations)} iterations, ${best}` }
+  return { title, body: `${formatCount(job.evaluations)} evaluations, ${best}` }
 }

@@ -112,7 +112,7 @@ export function useJob(id: string) {
     if (suspended) stop()
     setHeld(suspended)
   }, [])
-  return { job, error, followed, replace, reload: refresh, held, hold }
+  return { job, error, missing: missing.current, followed, replace, reload: refresh, held, hold }
 }
 
 /** Load committed iterations in pages, faster than as events; on failure the stream has the rest. */

@@ -12,6 +12,7 @@ import { inWords } from '../../format/words'
 import { Bars } from '../bars'
 import { SearchButton } from '../candidates/search-button'
 import { searchedVariables } from '../facts'
+import { CertificateCard } from './certificate-card'
 
 /** Fewest designs simulated around the winner. */
 const LEAST_SAMPLES = 128
@@ -29,6 +30,7 @@ export default function RobustnessPanel({ job }: { job: Job }) {
   }
   return (
     <div class="stack" data-robustness={response.data?.index?.value ?? ''}>
+      <CertificateCard job={job} />
       <Loaded
         resource={response}
         what="simulations of designs around the winner"

@@ -1,7 +1,6 @@
 /** Targets of a calibration compared with its best design. */
 
-import { get } from '../../api/client'
-import { usePolling, useResource } from '../../api/resource'
+import { useResource } from '../../api/resource'
 import type { Job, TargetResult, Targets } from '../../api/types'
 import { Card, EmptyCard, Loaded } from '../../components/card'
 import { Select } from '../../components/fields/controls'
@@ -10,9 +9,7 @@ import { change, formatExact, formatNumber, NONE, percent, quantity } from '../.
 import { placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
-import { isRunning } from '../facts'
-
-const RENEW_MS = 15_000
+import { isWithin, loadTargets, metTargets } from '../outcome'
 
 const LEAVE_OUT = [
   ['', 'nothing: compare only'],
@@ -23,14 +20,8 @@ const LEAVE_OUT = [
 export default function TargetsPanel({ job }: { job: Job }) {
   const word = usePlace().query.get('leave_out')
   const leaveOut = LEAVE_OUT.find(([what]) => what === word)?.[0] ?? ''
-  const targets = useResource(job.best ? `${job.id} ${leaveOut}` : null, (signal) =>
-    get('/v1/jobs/{job_id}/targets', {
-      path: { job_id: job.id },
-      query: leaveOut === '' ? {} : { leave_out: leaveOut },
-      signal,
-    }),
-  )
-  usePolling(targets.reload, RENEW_MS, isRunning(job))
+  const key = job.best && `${job.id} ${placeWord(job.best)} ${leaveOut}`
+  const targets = useResource(key, () => loadTargets(job, leaveOut), { keep: true })
   if (!job.best) {
     return (
       <EmptyCard title="Nothing to compare yet">
@@ -40,7 +31,8 @@ export default function TargetsPanel({ job }: { job: Job }) {
   }
   return (
     <Card
-      title="Targets"
+      title={targets.data ? headline(targets.data) : 'Targets'}
+      class="headline-card"
       tools={
         <Select
           label="Predict each target without"
@@ -57,22 +49,22 @@ export default function TargetsPanel({ job }: { job: Job }) {
   )
 }
 
-function isWithin(difference: number | null): boolean {
-  return difference !== null && Math.abs(difference) <= 1
+function headline(targets: Targets): string {
+  const [met, fitted] = metTargets(targets)
+  return `${met} of ${fitted} targets met`
 }
 
 function TargetsTable({ targets, predicts }: { targets: Targets; predicts: boolean }) {
-  const fitted = targets.targets.filter(({ use }) => use === 'fit')
-  const within = fitted.filter(({ difference }) => isWithin(difference)).length
+  const [within, fitted] = metTargets(targets)
   return (
     <>
-      <p data-within={within} data-fitted={fitted.length}>
-        The best design, {placeWord(targets)}, is within tolerance of{' '}
-        <strong>
-          {within} of {fitted.length}
-        </strong>{' '}
-        fitted targets. Its misfit, the root mean square over them, is{' '}
-        {formatNumber(targets.fitness)} tolerances.
+      <p data-within={within} data-fitted={fitted}>
+        The best design, {placeWord(targets)}, is{' '}
+        {within === fitted ? 'within tolerance of all' : 'outside the tolerance of some'} fitted
+        targets. Its misfit, the root mean square over them, is {formatNumber(targets.fitness)}{' '}
+        tolerances.
+        {within < fitted &&
+          ' Check the targets, widen the bounds of the parameters, or add parameters that matter for them.'}
       </p>
       <Table
         caption="Targets and results of the best design"

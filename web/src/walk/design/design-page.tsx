@@ -82,9 +82,10 @@ interface DesignLinksProps {
   /** Path of the other page; null if it does not apply. */
   path: string | null
   label: string
+  withJob?: boolean
 }
 
-export function DesignLinks({ source, path, label }: DesignLinksProps) {
+export function DesignLinks({ source, path, label, withJob = true }: DesignLinksProps) {
   const query = Object.entries(queryOf(source)).map(([name, value]) => [name, value ?? undefined])
   return (
     <div class="row">
@@ -93,7 +94,7 @@ export function DesignLinks({ source, path, label }: DesignLinksProps) {
           {label}
         </a>
       )}
-      {'job' in source && (
+      {withJob && 'job' in source && (
         <a class="button" href={jobPath(source.job)}>
           Show job
         </a>

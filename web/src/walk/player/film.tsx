@@ -30,11 +30,17 @@ const FIRST = 4
 /** Duration of the last frame [ms], so that the recorder captures it. */
 const LAST = 100
 
-/** First supported WebM type; undefined if there is none. */
+/** First supported type, MP4 if possible; undefined if there is none. */
 function filmType(): string | undefined {
   if (typeof MediaRecorder === 'undefined') return undefined
   if (!('captureStream' in HTMLCanvasElement.prototype)) return undefined
-  const types = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm']
+  const types = [
+    'video/mp4;codecs=avc1.640028',
+    'video/mp4',
+    'video/webm;codecs=vp9',
+    'video/webm;codecs=vp8',
+    'video/webm',
+  ]
   return types.find((type) => MediaRecorder.isTypeSupported(type))
 }
 
@@ -50,8 +56,9 @@ export async function film(
   signal: AbortSignal,
 ): Promise<Blob> {
   const stream = canvas.captureStream(PICTURES)
+  const type = filmType()
   const recorder = new MediaRecorder(stream, {
-    mimeType: filmType(),
+    mimeType: type,
     videoBitsPerSecond: BITS_PER_PIXEL * PICTURES * canvas.width * canvas.height,
   })
   const parts: Blob[] = []
@@ -86,7 +93,7 @@ export async function film(
     }
     playback.play()
     await recorded
-    return new Blob(parts, { type: 'video/webm' })
+    return new Blob(parts, { type: type?.split(';')[0] })
   } finally {
     finished.abort()
     unsubscribe()
@@ -119,7 +126,7 @@ export function FilmDialog({ playback, onRecord, onClose }: FilmDialogProps) {
     try {
       const video = await onRecord(SIZES[chosen], abort.signal)
       const scenario = new URLSearchParams(location.search).get('scenario') ?? ''
-      saveFile(video, `${fileStem('walk', scenario)}.webm`)
+      saveFile(video, `${fileStem('walk', scenario)}.${video.type.split('/')[1]}`)
       dialog.current?.close()
     } catch (error) {
       if (!abort.signal.aborted) setFailure(messageOf(error))
@@ -132,7 +139,7 @@ export function FilmDialog({ playback, onRecord, onClose }: FilmDialogProps) {
       <div class="stack-tight">
         {!isSupported ? (
           <p class="notice" data-tone="warn" role="alert">
-            This browser cannot record WebM video. Use a current Firefox or Chromium-based browser.
+            This browser cannot record video. Use a current Firefox or Chromium-based browser.
           </p>
         ) : recording ? (
           <>

@@ -27,7 +27,7 @@ interface PlayerControlsProps {
 
 export function PlayerControls(props: PlayerControlsProps) {
   const { playback, comparing, meshed, options, onOptions, onLook, onFilm, onPicture } = props
-  const check = (key: 'forces' | 'trail' | 'meshes', label: string) => (
+  const check = (key: 'forces' | 'trail' | 'support' | 'meshes', label: string) => (
     <Check
       label={label}
       checked={options[key]}
@@ -60,6 +60,7 @@ export function PlayerControls(props: PlayerControlsProps) {
         )}
         {check('forces', 'Forces')}
         {check('trail', 'Trail')}
+        {check('support', 'Support')}
         {meshed && check('meshes', 'Meshes')}
         <span class="row looks">
           {LOOKS.map(([view, label]) => (

@@ -168,6 +168,12 @@ export function SceneLegend({ walks, cell, newtons, options }: SceneLegendProps)
         <i class="disc" aria-hidden="true" />
         foot on the ground
       </span>
+      {options.support && (
+        <span>
+          <i class="swatch support-area" aria-hidden="true" />
+          support polygon
+        </span>
+      )}
       {options.forces && (
         <span>
           <i class="arrow" aria-hidden="true" />

@@ -9,6 +9,7 @@ export const DEFAULT_VIEW: SceneOptions = {
   follow: true,
   forces: true,
   trail: true,
+  support: true,
   meshes: true,
 }
 
@@ -20,6 +21,7 @@ const WORDS: Readonly<Record<string, Partial<SceneOptions>>> = {
   still: { follow: false },
   'no-forces': { forces: false },
   'no-trail': { trail: false },
+  'no-support': { support: false },
   'no-meshes': { meshes: false },
 }
 

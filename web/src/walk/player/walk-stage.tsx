@@ -18,6 +18,7 @@ const OPTIONS = {
   follow: true,
   forces: false,
   trail: false,
+  support: true,
   meshes: true,
 } as const
 

@@ -3,6 +3,7 @@
 import type { Series } from '../../charts/lines/line-chart'
 import { inWords } from '../../format/words'
 import type { Recorded, Replay } from '../replay/replay'
+import { slipSpeed } from '../replay/support'
 
 export interface Curve {
   readonly label: string
@@ -10,6 +11,8 @@ export interface Curve {
   readonly index: number
   readonly colour: `--${string}`
   readonly thin?: boolean
+  /** Derived value of a frame, in place of the channel's. */
+  readonly of?: (replay: Replay, frame: number) => number
 }
 
 export interface PlotSpec {
@@ -18,6 +21,8 @@ export interface PlotSpec {
   readonly quantity: string
   readonly unit: string
   readonly curves: readonly Curve[]
+  /** Of the absolute value, by label; drawn where it lies within the chart. */
+  readonly limits?: readonly { readonly label: string; readonly value: number }[]
 }
 
 const COLOURS = [
@@ -31,7 +36,7 @@ const COLOURS = [
 
 /** All charts of a walk, joint charts for one leg. Charts of missing channels are omitted. */
 export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
-  const { legs } = replay.header.robot
+  const { legs, torque_limits, current_limits } = replay.header.robot
   const name = inWords(legs[leg])
   const joints = ofJoints(replay, leg)
   const inBody = "In the body's frame: x forward, y left, z up; without gravity."
@@ -48,16 +53,42 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
     colour: COLOURS[k % COLOURS.length],
   }))
   const supply = { label: 'supply', channel: 'supply', index: 0, colour: COLOURS[0] }
-  const rows: readonly [title: string, note: string, quantity: string, unit: string, Curve[]][] = [
+  const slips = legs.map((each, k) => ({
+    label: inWords(each),
+    channel: 'foot_force',
+    index: 3 * k,
+    colour: COLOURS[k % COLOURS.length],
+    of: (walk: Replay, frame: number) => 1e3 * slipSpeed(walk, k, frame),
+  }))
+  const limits = (values: readonly number[]) =>
+    joints.map(({ label, index }) => ({ label: `limit of ${label}`, value: values[index] }))
+  type Row = readonly [
+    title: string,
+    note: string,
+    quantity: string,
+    unit: string,
+    curves: Curve[],
+    limits?: ReturnType<typeof limits>,
+  ]
+  const rows: readonly Row[] = [
     [`Joint angles, ${name}`, 'Thin: desired. Thick: actual.', 'angle', 'rad', angles],
-    [`Motor currents, ${name}`, 'Of each motor of the leg.', 'current', 'A', of('current')],
+    [
+      `Motor currents, ${name}`,
+      'Of each motor of the leg.',
+      'current',
+      'A',
+      of('current'),
+      limits(current_limits),
+    ],
     [
       `Gear torques, ${name}`,
       'Torque of each gear on its joint.',
       'torque',
       'N m',
       of('load_torque'),
+      limits(torque_limits),
     ],
+    ['Slip of the feet', 'Speed on the ground while standing.', 'slip', 'mm/s', slips],
     ['Acceleration of the body', inBody, 'acceleration', 'm/s²', ofAxes('body_acceleration', 0)],
     [`Ground reaction force, ${name}`, onGround, 'force', 'N', ofAxes('foot_force', 3 * leg)],
     ['Ground reaction force, all feet', 'Normal component.', 'normal force', 'N', normal],
@@ -65,7 +96,14 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
   ]
   return rows
     .filter(([, , , , curves]) => curves.every(({ channel }) => replay.channel(channel)))
-    .map(([title, note, quantity, unit, curves]) => ({ title, note, quantity, unit, curves }))
+    .map(([title, note, quantity, unit, curves, limits]) => ({
+      title,
+      note,
+      quantity,
+      unit,
+      curves,
+      limits,
+    }))
 }
 
 // A leg's joints start with its name.
@@ -117,7 +155,7 @@ export function seriesOf(curves: readonly Curve[], walks: readonly Recorded[]): 
 function valuesOf(replay: Replay, curve: Curve, length: number): (number | null)[] {
   const values: (number | null)[] = new Array(length).fill(null)
   for (let frame = 0; frame < replay.frames; frame++) {
-    const value = replay.value(curve.channel, frame, curve.index)
+    const value = curve.of?.(replay, frame) ?? replay.value(curve.channel, frame, curve.index)
     if (Number.isFinite(value)) values[frame] = value
   }
   return values

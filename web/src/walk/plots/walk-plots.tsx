@@ -1,8 +1,10 @@
 /** Plots of a walk over time: one leg, the body, all feet. */
 
-import { useMemo, useRef, useState } from 'preact/hooks'
+import { useCallback, useMemo, useRef, useState } from 'preact/hooks'
+import type uPlot from 'uplot'
 import { ChartCard, LineCard } from '../../charts/chart-card'
 import type { Series } from '../../charts/lines/line-chart'
+import { paintReference } from '../../charts/lines/reference-line'
 import { linearTicks } from '../../charts/scale'
 import { Select } from '../../components/fields/controls'
 import { Table } from '../../components/table/table'
@@ -11,6 +13,7 @@ import { formatExact, formatNumber, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 import { type Playback, usePlayback } from '../player/playback'
 import { type Recorded, stances } from '../replay/replay'
+import { WalkFigures } from '../walk-figures'
 import { ObjectivesTable } from '../walk-result'
 import { moments, type PlotSpec, plotSpecs, seriesOf } from './plot-specs'
 
@@ -32,6 +35,7 @@ export function WalkPlots({ walks, all, playback }: WalkPlotsProps) {
   const specs = useMemo(() => plotSpecs(replay, shown), [replay, shown])
   return (
     <section class="stack" aria-label="Charts over time">
+      <WalkFigures walks={walks} />
       <div class="row spread">
         <p class="muted small">
           Click a chart to seek, drag to zoom, double-click to reset the zoom.
@@ -45,11 +49,11 @@ export function WalkPlots({ walks, all, playback }: WalkPlotsProps) {
         />
       </div>
       <div class="grid plots">
-        <ObjectivesTable walks={all} />
         <GaitChart walks={walks} playback={playback} />
         {specs.map((spec) => (
           <PlotCard key={spec.quantity} spec={spec} walks={walks} playback={playback} />
         ))}
+        <ObjectivesTable walks={all} />
       </div>
     </section>
   )
@@ -67,6 +71,14 @@ export function PlotCard({ spec, walks, playback }: PlotCardProps) {
   const box = useRef<HTMLDivElement>(null)
   const visible = useVisible(box)
   const { time } = usePlayback(playback, RENEWED, visible)
+  const limits = useCallback(
+    (plot: uPlot) => {
+      for (const { label, value } of spec.limits ?? []) {
+        for (const fitness of [value, -value]) paintReference(plot, { label, fitness })
+      }
+    },
+    [spec],
+  )
   const frame = Math.max(...walks.map(({ replay }) => replay.frameAt(time)))
   return (
     <div class="plot" ref={box}>
@@ -86,6 +98,7 @@ export function PlotCard({ spec, walks, playback }: PlotCardProps) {
         yUnit={spec.unit}
         series={series}
         height={220}
+        paintOver={limits}
         marker={time}
         sync="walk"
         onPick={(moment) => playback.seek(moment)}

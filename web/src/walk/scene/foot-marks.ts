@@ -1,9 +1,12 @@
 /** Marks of foot contacts with force arrows. */
 
 import {
+  BufferAttribute,
+  BufferGeometry,
   CircleGeometry,
   ConeGeometry,
   CylinderGeometry,
+  DoubleSide,
   Group,
   Mesh,
   MeshBasicMaterial,
@@ -11,6 +14,7 @@ import {
   Vector3,
 } from 'three'
 import { CONTACT_FORCE, type Replay } from '../replay/replay'
+import { hull } from '../replay/support'
 import type { Palette } from './palette'
 
 /** Radii, and length of an arrow's head, in spans of the robot. */
@@ -29,8 +33,16 @@ export class FootMarks {
   private readonly discMaterial = new MeshBasicMaterial({ transparent: true, opacity: 0.75 })
   // Drawn through the leg, along which most forces point.
   private readonly arrowMaterial = new MeshBasicMaterial({ depthTest: false, transparent: true })
+  private readonly supportMaterial = new MeshBasicMaterial({
+    transparent: true,
+    opacity: 0.16,
+    depthWrite: false,
+    side: DoubleSide,
+  })
+  private readonly support: Mesh<BufferGeometry>
   private readonly force = new Vector3()
   withForces = true
+  withSupport = true
 
   constructor(
     private readonly replay: Replay,
@@ -43,6 +55,14 @@ export class FootMarks {
     const legs = replay.header.robot.legs.length
     this.positions = new Float32Array(3 * legs)
     this.forces = new Float32Array(3 * legs)
+    this.support = new Mesh(new BufferGeometry(), this.supportMaterial)
+    this.support.geometry.setAttribute(
+      'position',
+      new BufferAttribute(new Float32Array(9 * legs), 3),
+    )
+    // Its extent changes, and so would the bounds.
+    this.support.frustumCulled = false
+    this.object.add(this.support)
     for (let leg = 0; leg < legs; leg++) {
       const disc = new Mesh(new CircleGeometry(DISC * span, 32), this.discMaterial)
       const arrow = new Arrow(this.arrowMaterial, span)
@@ -64,10 +84,30 @@ export class FootMarks {
       this.arrows[leg].point(x, y, this.height, this.force, size * this.scale)
       this.arrows[leg].object.visible = disc.visible && this.withForces
     })
+    this.showSupport()
+  }
+
+  /** Fill the convex hull of the standing feet, as a fan of triangles. */
+  private showSupport(): void {
+    const standing = this.discs
+      .filter(({ visible }) => visible)
+      .map(({ position: { x, y, z } }): [number, number, number] => [x, y, z / 2])
+    const corners = hull(standing)
+    this.support.visible = this.withSupport && corners.length > 2
+    const { geometry } = this.support
+    const places = geometry.getAttribute('position') as BufferAttribute
+    for (let k = 1; k + 1 < corners.length; k++) {
+      for (const [n, corner] of [corners[0], corners[k], corners[k + 1]].entries()) {
+        places.setXYZ(3 * (k - 1) + n, ...corner)
+      }
+    }
+    places.needsUpdate = true
+    geometry.setDrawRange(0, 3 * Math.max(0, corners.length - 2))
   }
 
   recolour(colours: Palette, accent: Palette['force']): void {
     this.discMaterial.color.copy(accent)
+    this.supportMaterial.color.copy(accent)
     this.arrowMaterial.color.copy(colours.force)
   }
 }

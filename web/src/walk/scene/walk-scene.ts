@@ -30,6 +30,8 @@ export interface SceneOptions {
   readonly follow: boolean
   readonly forces: boolean
   readonly trail: boolean
+  /** Show the polygon of the standing feet. */
+  readonly support: boolean
   /** Show the URDF's meshes if loaded, instead of simplified shapes. */
   readonly meshes: boolean
 }
@@ -164,6 +166,7 @@ export class WalkScene {
       figure.setGhost(k > 0 && !sideBySide)
       figure.showMeshes(options.meshes)
       feet.withForces = options.forces && (sideBySide || k === 0)
+      feet.withSupport = options.support && (sideBySide || k === 0)
       trail.visible = options.trail
     })
     const { ground } = this.lanes[0].replay.header

@@ -10,7 +10,7 @@ const walk = (count: number, label: string) => ({
 
 test('charts of channels that were not recorded are omitted', () => {
   const keys = plotSpecs(walk(3, 'A').replay, 0).map(({ quantity }) => quantity)
-  expect(keys).toEqual(['force', 'normal force'])
+  expect(keys).toEqual(['slip', 'force', 'normal force'])
 })
 
 test('the second walk has dashed curves, without values after its end', () => {

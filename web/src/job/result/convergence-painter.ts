@@ -16,14 +16,16 @@ export interface Painted {
 export function paintDots(plot: uPlot, { dots }: Painted): void {
   if (dots === null) return
   const { ctx, bbox } = plot
-  const size = 2 * devicePixelRatio
+  const size = (dots.fitness.length > 1000 ? 2.5 : 4) * devicePixelRatio
   clipped(plot, () => {
-    ctx.fillStyle = withAlpha(themeColour('--series-1'), dots.fitness.length > 2000 ? 0.35 : 0.6)
+    ctx.fillStyle = withAlpha(themeColour('--series-1'), dots.fitness.length > 1000 ? 0.4 : 0.55)
     for (let row = 0; row < dots.fitness.length; row++) {
       const y = plot.valToPos(dots.fitness[row], 'y', true)
       if (y < bbox.top) continue
       const x = plot.valToPos(dots.iterations[row], 'x', true)
-      ctx.fillRect(x - size / 2, y - size / 2, size, size)
+      ctx.beginPath()
+      ctx.arc(x, y, size / 2, 0, 2 * Math.PI)
+      ctx.fill()
     }
   })
 }

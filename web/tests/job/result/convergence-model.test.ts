@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import type { Particles } from '../../../src/job/designs/particles'
-import { dotsOf, fittedRange, iterationsAbove } from '../../../src/job/overview/model'
+import { dotsOf, fittedRange, iterationsAbove } from '../../../src/job/result/model'
 
 const column = (name: string, values: readonly number[]) => ({
   name,

@@ -1,6 +1,6 @@
-/** What the charts of the overview draw: axis range, single designs, strips and bars. */
+/** What the charts of the result draw: axis range, designs and bars. */
 
-import type { DistributionItem, Variable } from '../../api/types'
+import type { Variable } from '../../api/types'
 import { logRange } from '../../charts/scale'
 import type { Design, Value } from '../../format/value'
 import { columnNamed, type Particles } from '../designs/particles'
@@ -9,7 +9,7 @@ import { columnNamed, type Particles } from '../designs/particles'
 const ROOM = 0.06
 
 /** Most single designs drawn; beyond, the server returns every n-th iteration. */
-export const MOST_DOTS = 10_000
+export const MOST_DOTS = 2000
 
 export type Line = ArrayLike<number | null>
 
@@ -70,35 +70,6 @@ export function iterationsAbove(
     }
   }
   return above
-}
-
-export interface Strip {
-  /** First and last iteration, and their middle. */
-  readonly from: number
-  readonly to: number
-  readonly middle: number
-  /** Mean of each quantile, ignoring iterations in which every design failed. */
-  readonly fitness: readonly (number | null)[]
-}
-
-/** At most `most` strips of equal width; one per iteration if possible. */
-export function grouped(items: readonly DistributionItem[], most: number): readonly Strip[] {
-  const size = Math.max(1, Math.ceil(items.length / most))
-  const strips: Strip[] = []
-  for (let start = 0; start < items.length; start += size) {
-    const group = items.slice(start, start + size)
-    const [from, to] = [group[0].index, group[group.length - 1].index]
-    const fitness = group[0].fitness.map((_, column) => mean(group.map((i) => i.fitness[column])))
-    strips.push({ from, to, middle: (from + to) / 2, fitness })
-  }
-  return strips
-}
-
-function mean(values: readonly (number | null)[]): number | null {
-  const present = values.filter((value) => value !== null)
-  return present.length === 0
-    ? null
-    : present.reduce((sum, value) => sum + value, 0) / present.length
 }
 
 /** Share of the range that counts as being at a bound, as in the API's analysis. */

@@ -1,4 +1,4 @@
-/** Best, median and quantiles of the fitness by iteration. */
+/** Designs and the best fitness by iteration; the quantiles on request. */
 
 import { useCallback, useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
@@ -11,13 +11,15 @@ import { lineLabel, type ReferenceLine } from '../../charts/lines/reference-line
 import { Check } from '../../components/fields/controls'
 import { formatCount, formatNumber, withUnit } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
+import { navigate } from '../../router/navigation'
 import { flag, useQueryValue } from '../../router/query-value'
+import { jobPath } from '../../router/routes'
 import { ByIteration } from '../by-iteration'
 import { decodeParticles } from '../designs/particles'
 import { fitnessUnit } from '../facts'
 import { paintDots, paintOver } from './convergence-painter'
-import { type Dots, dotsOf, fittedRange, iterationsAbove, MOST_DOTS } from './model'
-import type { Distribution } from './use-distribution'
+import { type Dots, dotsOf, fittedRange, iterationsAbove, type Line, MOST_DOTS } from './model'
+import { type Distribution, useDistribution } from './use-distribution'
 
 const RENEW_MS = 8000
 
@@ -26,23 +28,28 @@ const COLUMNS = ['best_so_far', 'best', 'median', 'mean', 'worst'] as const
 export function ConvergenceChart({
   job,
   iterations,
-  distribution,
   reference,
 }: {
   job: Job
   iterations: readonly Iteration[]
-  distribution: Distribution
   reference: ReferenceLine | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
-  const [single, setSingle] = useQueryValue('dots', flag(false), false)
-  const dots = useDots(job, iterations.length, single)
-  const drawn = useMemo(() => content(iterations, distribution), [iterations, distribution])
+  const [bands, setBands] = useQueryValue('bands', flag(false), false)
+  const distribution = useDistribution(job.id, bands ? iterations.length : 0)
+  const dots = useDots(job, iterations.length)
+  const drawn = useMemo(
+    () => content(iterations, bands ? distribution : null),
+    [iterations, distribution, bands],
+  )
   const unit = fitnessUnit(job)
   const best = iterations.at(-1)?.best_so_far ?? null
   const { range, painted } = useMemo(() => {
-    const [bests, medians] = drawn.series.slice(-2).map(({ values }) => values)
-    const range = fittedRange([bests, medians], reference ? [reference.fitness] : [], logarithmic)
+    const range = fittedRange(
+      drawn.lines.map(({ values }) => settled(values)),
+      reference ? [reference.fitness] : [],
+      logarithmic,
+    )
     const highest = drawn.bands.length > 0 ? drawn.series[0].values : null
     const last = drawn.x.at(-1)
     const end =
@@ -57,19 +64,19 @@ export function ConvergenceChart({
   return (
     <ChartCard
       title="Convergence"
-      note="Fitness by iteration; lower is better. Drag to zoom, double-click to reset."
+      note="Each dot is a design; lower is better. Click to open an iteration, drag to zoom."
       tools={
         <>
-          <Check label="single designs" checked={single} onChange={setSingle} />
+          <Check label="bands" checked={bands} onChange={setBands} />
           <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
         </>
       }
       legend={
         <>
           <LegendEntry colour="--series-1" label="best so far" />
-          <LegendEntry colour="--series-2" label="median" />
           {drawn.bands.length > 0 && (
             <>
+              <LegendEntry colour="--series-2" label="median" />
               <LegendEntry colour="--fan-inner" label="25 % to 75 % of the designs" area />
               <LegendEntry colour="--fan-outer" label="5 % to 95 %" area />
             </>
@@ -114,16 +121,26 @@ export function ConvergenceChart({
         yRange={range}
         paint={paint}
         paintOver={over}
+        onPick={(x) => navigate(jobPath(job.id, `iterations/${pickable(x, iterations.length)}`))}
         height={320}
       />
     </ChartCard>
   )
 }
 
-function useDots(job: Job, committed: number, enabled: boolean): Dots | null {
+function pickable(x: number, count: number): number {
+  return Math.min(count - 1, Math.max(0, Math.round(x)))
+}
+
+/** A line without its first twentieth, which would compress the rest. */
+function settled(values: Line): Line {
+  return Array.from(values).slice(Math.floor(values.length / 20))
+}
+
+function useDots(job: Job, committed: number): Dots | null {
   const renewed = useSlowly(committed, RENEW_MS)
   const dots = useResource(
-    enabled ? `dots ${job.id} ${renewed}` : null,
+    `dots ${job.id} ${renewed}`,
     (signal) =>
       getBytes('/v1/jobs/{job_id}/particles', {
         path: { job_id: job.id },
@@ -138,18 +155,20 @@ function useDots(job: Job, committed: number, enabled: boolean): Dots | null {
 /** Quantiles between which the bands are drawn. */
 const EDGES = [0.95, 0.75, 0.25, 0.05]
 
-function content(iterations: readonly Iteration[], { quantiles, items }: Distribution) {
+const NO_BANDS: Pick<Distribution, 'quantiles' | 'items'> = { quantiles: [], items: [] }
+
+function content(iterations: readonly Iteration[], distribution: Distribution | null) {
   const x = iterations.map((i) => i.index)
-  const lines: Series[] = [
-    {
-      label: 'best so far',
-      values: iterations.map((i) => i.best_so_far),
-      colour: '--series-1',
-      width: 2.2,
-    },
-    { label: 'median', values: iterations.map((i) => i.median), colour: '--series-2' },
-  ]
-  if (!EDGES.every((share) => quantiles.includes(share))) return { x, series: lines, bands: [] }
+  const best: Series = {
+    label: 'best so far',
+    values: iterations.map((i) => i.best_so_far),
+    colour: '--series-1',
+    width: 2.2,
+  }
+  const { quantiles, items } = distribution ?? NO_BANDS
+  if (!EDGES.every((share) => quantiles.includes(share))) {
+    return { x, series: [best], lines: [best], bands: [] }
+  }
   const edge = (share: number): Series => {
     const column = quantiles.indexOf(share)
     const byIndex = new Map(items.map((item) => [item.index, item.fitness[column]]))
@@ -160,9 +179,14 @@ function content(iterations: readonly Iteration[], { quantiles, items }: Distrib
       width: 0,
     }
   }
+  const median: Series = {
+    label: 'median',
+    values: iterations.map((i) => i.median),
+    colour: '--series-2',
+  }
   const bands: Band[] = [
     { upper: 0, lower: 3, colour: '--series-1', opacity: 0.13 },
     { upper: 1, lower: 2, colour: '--series-1', opacity: 0.22 },
   ]
-  return { x, series: [...EDGES.map(edge), ...lines], bands }
+  return { x, series: [...EDGES.map(edge), best, median], lines: [best, median], bands }
 }

@@ -2,7 +2,7 @@ import { expect, test } from 'vitest'
 import type { Variable } from '../../../src/api/types'
 import { gainOf } from '../../../src/job/gain'
 import { endInWords, noticeState } from '../../../src/job/header/end-notice'
-import { winnerVariables } from '../../../src/job/overview/model'
+import { winnerVariables } from '../../../src/job/result/model'
 
 const variable = (name: string, low: number | null, high: number | null) =>
   ({ name, unit: 'V', low, high, kind: 'continuous' }) as unknown as Variable
@@ -47,10 +47,10 @@ test('a gain names its reference: a published design, or the start design', () =
 })
 
 test('a notification states how the job ended, if the browser allows it', () => {
-  const job = { id: 'k2', name: '', state: 'succeeded', iterations: 25, error: null } as const
+  const job = { id: 'k2', name: '', state: 'succeeded', evaluations: 25, error: null } as const
   expect(endInWords({ ...job, best_fitness: 12.5 })).toEqual({
     title: 'k2: succeeded',
-    body: '25 iterations, best fitness 12.500',
+    body: '25 evaluations, best fitness 12.500',
   })
   expect(endInWords({ ...job, best_fitness: null }).body).toContain('no design walks')
   expect(endInWords({ ...job, best_fitness: 1, state: 'failed', error: 'no robot' }).body).toBe(

@@ -1,31 +1,33 @@
-/** Overview of a job: convergence, distribution, diversity, winner and limiting factors. */
+/** Result of a job: verdict, scenarios, convergence, best design. */
 
 import type { Job, JobSpec, Preference } from '../../api/types'
 import { ChartCard } from '../../charts/chart-card'
 import { EmptyCard } from '../../components/card'
-import { ErrorNotice } from '../../components/feedback'
 import { Table } from '../../components/table/table'
 import { BrokenName } from '../../components/text'
 import { formatExact, formatNumber, NONE, percent, quantity } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { exactValueQuantity } from '../../format/value'
 import { inWords } from '../../format/words'
+import { lazyPage } from '../../router/lazy-page'
 import { withQuery } from '../../router/routes'
-import { IterationChart } from '../by-iteration'
 import { VARIABLE } from '../columns'
 import { searchedVariables } from '../facts'
 import type { PanelProps } from '../page'
 import { type Analysis, analyse, type Factor } from '../preference'
 import { ConvergenceChart } from './convergence-chart'
-import { DistributionChart } from './distribution-chart'
+import { Hero } from './hero'
 import { type WinnerVariable, winnerVariables } from './model'
-import { useDistribution } from './use-distribution'
-import { VerdictCard } from './verdict-card'
-import './overview.css'
+import './result.css'
 
-export function OverviewPanel({ live, job, gain: { reference, verdict } }: PanelProps) {
+const CertificatePanel = lazyPage('the certificate', () => import('../certificate/panel'))
+const CandidatesPanel = lazyPage('the candidates', () => import('../candidates/panel'))
+const ScenariosPanel = lazyPage('the scenarios', () => import('../scenarios/panel'))
+const TargetsPanel = lazyPage('the targets', () => import('../targets/panel'))
+
+export function ResultPanel({ live, job, gain }: PanelProps) {
   const { iterations } = live.followed
-  const distribution = useDistribution(job.id, iterations.length)
+  if (job.kind === 'certificate') return <CertificatePanel job={job} />
   if (iterations.length === 0) {
     return (
       <EmptyCard title={job.state === 'queued' ? 'Waiting for a runner' : 'No iteration yet'}>
@@ -37,41 +39,13 @@ export function OverviewPanel({ live, job, gain: { reference, verdict } }: Panel
   }
   return (
     <div class="stack">
-      {distribution.error !== null && (
-        <ErrorNotice
-          what="Could not load the distribution of fitness."
-          error={distribution.error}
-        />
-      )}
-      <ConvergenceChart
-        job={job}
-        iterations={iterations}
-        distribution={distribution}
-        reference={reference}
-      />
-      {verdict !== null && verdict.sentences.length > 0 && <VerdictCard verdict={verdict} />}
-      <div class="grid">
-        <DistributionChart job={job} iterations={iterations} distribution={distribution} />
-        <IterationChart
-          title="Diversity of the designs"
-          note={
-            distribution.items.some(({ diversity }) => diversity !== null)
-              ? 'Spread of the designs as a share of each variable’s range; near zero, the search has converged.'
-              : 'The method evaluates one design at a time, which has no spread.'
-          }
-          label={`Diversity of the designs, now ${percent(distribution.items.at(-1)?.diversity)} of the range`}
-          rows={distribution.items}
-          name="diversity"
-          yUnit="%"
-          format={(value) => formatNumber(value, 3)}
-          value={({ diversity }) => diversity && diversity * 100}
-          colour="--series-3"
-          zoomName="zoom-diversity"
-          fromZero
-        />
-      </div>
-      {job.best && job.kind !== 'certificate' && (
+      {job.kind === 'tuning' && <Hero job={job} gain={gain} />}
+      {job.kind === 'calibration' && <TargetsPanel job={job} />}
+      {job.kind === 'preferences' && <CandidatesPanel job={job} />}
+      <ConvergenceChart job={job} iterations={iterations} reference={gain.reference} />
+      {job.best && (
         <>
+          {job.kind !== 'preferences' && <ScenariosPanel job={job} />}
           <WinnerCard job={job} />
           {job.spec.kind === 'tuning' && !job.spec.worlds && (
             <LimitsCard job={job} spec={job.spec} />
@@ -89,7 +63,7 @@ function WinnerCard({ job }: { job: Job }) {
   const place = { job: job.id, iteration: best.iteration, particle: best.particle }
   return (
     <ChartCard
-      title="Winner"
+      title="Best design"
       note={`Design ${placeWord(best)}. Bars show the search ranges.${
         atBound.length > 0 ? ` At a bound: ${atBound.map(({ name }) => name).join(', ')}.` : ''
       }`}
@@ -107,7 +81,7 @@ function WinnerCard({ job }: { job: Job }) {
       }
       table={() => (
         <Table<WinnerVariable>
-          caption="Winner and search bounds"
+          caption="Best design and search bounds"
           rows={rows}
           pageSize={60}
           columns={[

@@ -1,0 +1,87 @@
+/** Figures of a walk that people know, compared with a baseline if there is one. */
+
+import { formatNumber, percent, quantity } from '../format/number'
+import type { Recorded, Replay } from './replay/replay'
+import { peakOf, slipPerMetre } from './replay/support'
+
+interface Figure {
+  readonly label: string
+  readonly unit: string
+  readonly better: 'more' | 'less'
+  readonly value: number | null
+  readonly note?: string
+}
+
+function figuresOf(replay: Replay): readonly Figure[] {
+  const { objectives, robot, gravity, load_kg } = replay.header
+  const { reciprocal_speed: slowness, energy } = objectives
+  const weight = (robot.mass + load_kg) * Math.hypot(...gravity)
+  const current = peakOf(replay, 'current', robot.current_limits)
+  const torque = peakOf(replay, 'load_torque', robot.torque_limits)
+  const ofLimit = (peak: typeof current, limit: string) =>
+    peak && `${percent(peak.share, 2)} of ${limit}`
+  return [
+    { label: 'Speed', unit: 'm/s', better: 'more', value: slowness ? 1 / slowness : null },
+    { label: 'Cost of transport', unit: '1', better: 'less', value: energy && energy / weight },
+    {
+      label: 'Peak current',
+      unit: 'A',
+      better: 'less',
+      value: current && current.peak,
+      note: ofLimit(current, 'stall') ?? undefined,
+    },
+    {
+      label: 'Peak gear torque',
+      unit: 'N m',
+      better: 'less',
+      value: torque && torque.peak,
+      note: ofLimit(torque, 'nominal') ?? undefined,
+    },
+    { label: 'Slip', unit: 'm/m', better: 'less', value: slipPerMetre(replay) },
+  ]
+}
+
+/** walks: the walk, and the baseline that it is compared with. */
+export function WalkFigures({ walks }: { walks: readonly Recorded[] }) {
+  const [figures, baseline] = walks.map(({ replay }) => figuresOf(replay))
+  return (
+    <dl class="card walk-figures" data-figures>
+      {figures.map(({ label, unit, better, value, note }, k) => (
+        <div key={label}>
+          <dt>{label}</dt>
+          <dd>{quantity(value, unit, 3)}</dd>
+          {note && <dd class="muted small">{note}</dd>}
+          {baseline && (
+            <Change value={value} from={baseline[k].value} better={better} unit={unit} />
+          )}
+        </div>
+      ))}
+    </dl>
+  )
+}
+
+interface ChangeProps {
+  value: number | null
+  from: number | null
+  better: 'more' | 'less'
+  unit: string
+}
+
+function Change({ value, from, better, unit }: ChangeProps) {
+  if (value === null || from === null || !(from > 0)) return null
+  const relative = value / from - 1
+  const same = Math.abs(relative) <= 0.005
+  const isBetter = relative > 0 === (better === 'more')
+  const tone = same ? 'same' : isBetter ? 'better' : 'worse'
+  const mark = { same: '=', better: '✓', worse: '✗' }[tone]
+  return (
+    <dd class="judged" data-tone={tone}>
+      <b>{mark}</b>{' '}
+      {same
+        ? 'the same as'
+        : `${percent(Math.abs(relative), 2)} ${relative > 0 ? 'more' : 'less'} than`}{' '}
+      {formatNumber(from, 3)}
+      {unit === '1' ? '' : ` ${unit}`}
+    </dd>
+  )
+}

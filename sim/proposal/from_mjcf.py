@@ -72,7 +72,12 @@ def _without_files(spec: Any, path: Path | None) -> list[str]:
             spec.delete(geom)
     for asset in [*lost.values(), *spec.hfields]:
         spec.delete(asset)
-    return [f"meshes that are not at hand: {', '.join(lost)}"] if lost else []
+    more = f" and {len(lost) - _LISTED} more" if len(lost) > _LISTED else ""
+    return [f"meshes that are not at hand: {', '.join([*lost][:_LISTED])}{more}"] if lost else []
+
+
+_LISTED: Final = 6
+"""Meshes that a note lists."""
 
 
 def _file_of(mesh: Any) -> Path:

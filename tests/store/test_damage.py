@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,6 +46,12 @@ def test_a_file_overwritten_with_garbage_is_noticed_though_it_can_still_be_read(
     opened.jobs()
     with pytest.raises(StoreUnavailable, match="damaged while it was in use"):
         opened.verify()
+
+
+def test_rows_that_cannot_be_fetched_are_a_fault_of_the_database(file: Path) -> None:
+    database = engine.Database(str(file))
+    with pytest.raises(StoreUnavailable, match=r"jobs\.db: disk I/O error"), database.read():
+        raise sqlite3.OperationalError("disk I/O error")
 
 
 def test_a_file_that_is_gone_is_noticed_and_not_recreated(opened: Store, file: Path) -> None:

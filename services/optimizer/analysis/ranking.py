@@ -88,7 +88,8 @@ def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
     walked = np.isfinite(fitness)
     fitness[infeasible_rows(columns, spec)] = np.inf
     present = _best_first(before)
-    ranks = {row: rank for rank, row in enumerate(present.tolist(), start=1)}
+    ranks = np.zeros(len(columns), dtype=np.int64)
+    ranks[present] = np.arange(1, len(present) + 1)
     rows = _best_first(fitness)[:top]
     views = evaluation_views(evaluations_of(replace(columns, fitness=fitness).rows(rows)), spec)
     starts = iteration_starts(columns)
@@ -96,26 +97,27 @@ def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
     best_so_far = np.minimum.accumulate(least).tolist()
     both = np.isfinite(fitness) & np.isfinite(before)
     correlation = spearman(fitness[both], before[both]) if both.any() else None
-    return RankingView(
-        preference=spec.preference,
-        evaluations=len(columns),
-        infeasible=int(np.count_nonzero(walked & np.isinf(fitness))),
-        fitness_of_present_best=float(fitness[present[0]]) if len(present) else None,
-        correlation=correlation,
-        top=[
-            RankedDesignView.model_validate(
+    # One validation for all: a call for each iteration would dominate.
+    return RankingView.model_validate(
+        {
+            "preference": spec.preference,
+            "evaluations": len(columns),
+            "infeasible": int(np.count_nonzero(walked & np.isinf(fitness))),
+            "fitness_of_present_best": float(fitness[present[0]]) if len(present) else None,
+            "correlation": correlation,
+            "top": [
                 {
                     **dict(view),
                     "rank": place,
-                    "rank_before": ranks.get(row),
+                    "rank_before": int(ranks[row]) or None,
                     "fitness_before": before[row],
                 }
-            )
-            for place, (row, view) in enumerate(zip(rows.tolist(), views, strict=True), start=1)
-        ],
-        best_so_far=[
-            BestSoFarView(index=index, fitness=value) for index, value in enumerate(best_so_far)
-        ],
+                for place, (row, view) in enumerate(zip(rows.tolist(), views, strict=True), start=1)
+            ],
+            "best_so_far": [
+                {"index": index, "fitness": value} for index, value in enumerate(best_so_far)
+            ],
+        }
     )
 
 

@@ -63,7 +63,11 @@ def require_success(job_id: str, values: Floats) -> None:
 
 def infeasible_rows(columns: EvaluationColumns, spec: JobSpec) -> NDArray[np.bool_]:
     """Return which designs (r,) violate the constraints of a spec; failed ones do, too."""
-    return violations(spec.limits(), columns.objectives) > 0.0
+    limits, result = spec.limits(), np.zeros(len(columns), dtype=np.bool_)
+    for first in range(0, len(columns) if limits else 0, _BLOCK):
+        rows = slice(first, first + _BLOCK)
+        result[rows] = violations(limits, columns.objectives[rows]) > 0.0
+    return result
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:

@@ -220,12 +220,14 @@ class Database:
     @contextmanager
     def translated_errors(self) -> Iterator[None]:
         """Raise StoreUnavailable for faults of the database."""
+        driver = self.engine.dialect.loaded_dbapi.Error
         try:
             yield
-        except (DatabaseError, InterfaceError, PoolTimeout) as error:
+        except (DatabaseError, InterfaceError, PoolTimeout, driver) as error:
             # InternalError: a PostgreSQL server that became read-only or ended the session. A bare
-            # DatabaseError: a file or an answer that is not a database's.
-            faults = (OperationalError, InterfaceError, InternalError, PoolTimeout)
+            # DatabaseError: a file or an answer that is not a database's. The driver's own: rows
+            # that cannot be fetched.
+            faults = (OperationalError, InterfaceError, InternalError, PoolTimeout, driver)
             if not isinstance(error, faults) and type(error) is not DatabaseError:
                 raise
             cause = self.without_secrets(_cause(error))
@@ -254,7 +256,7 @@ class Aggregate:
         self._clock = clock
 
 
-def _cause(error: DatabaseError | InterfaceError | PoolTimeout) -> str:
+def _cause(error: Exception) -> str:
     """Return the driver's message, without the statement and its parameters."""
     origin = getattr(error, "orig", None)
     text = " ".join(str(error if origin is None else origin).split())

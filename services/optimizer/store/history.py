@@ -198,7 +198,8 @@ def _select_columns(
         .where(*_between(evaluations, job_id, first, last))
         .order_by(table.iteration, table.particle)
     )
-    rows = connection.execute(query).all()
+    # The driver's tuples: Row objects would take a third of the time to read a history.
+    rows = connection.execute(query).cursor.fetchall()
     if not rows:
         return None
     iteration, particle, designs, objectives, statuses, fitness = zip(*rows, strict=True)

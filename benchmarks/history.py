@@ -45,7 +45,7 @@ def variants(store: Store, job: Job) -> dict[str, tuple[Callable[[], object], fl
     by_other = job.spec.model_copy(update={"preference": preference})
     limits = [{"quantity": "*", "relative_to": "published:A", "max": 2.65}, "speed>=0.01"]
     constrained = JobService(store).under(
-        job.spec, TypeAdapter(Constraints).validate_python(limits)
+        job.spec, constraints=TypeAdapter(Constraints).validate_python(limits)
     )
 
     def what_if() -> DatabaseJobs:

@@ -123,10 +123,9 @@ def build_spec(options: SpecOptions) -> AnySpec:
         fields["constraints"] = constraints
     _merge_settings(fields, data.get("optimizer", {}))
     _merge_worlds(fields, data.get("worlds"))
-    if (weights := fields.pop("scenario_weight", None)) is not None:
-        form = "NAME=WEIGHT, such as slope-fast=2"
-        pairs = [name_and_value(text, "scenario-weight", form) for text in weights]
-        fields["scenario_weights"] = dict(pairs)
+    weights = weights_choice(fields.pop("scenario_weight", None))
+    if weights is not None:
+        fields["scenario_weights"] = weights
     _set_start(fields, data)
     with_gait = fields.pop("with_gait", False)
     spec = job_spec(data, **fields)
@@ -209,6 +208,12 @@ def constraint_choice(
         reference = reference_choice(no_worse_than, "no-worse-than")
         chosen.append({"quantity": "*", "relative_to": reference, "max": 1.0})
     return chosen or None
+
+
+def weights_choice(weights: Sequence[str] | None) -> dict[str, Any] | None:
+    """Return the unchecked field `scenario_weights` of a spec; None without the option."""
+    form = "NAME=WEIGHT, such as slope-fast=2"
+    return dict(name_and_value(text, "scenario-weight", form) for text in weights or ()) or None
 
 
 def reference_choice(text: str, option: str) -> Any:

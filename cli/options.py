@@ -199,6 +199,24 @@ NoWorseThan = Annotated[
     ),
 ]
 
+ScenarioWeight = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=WEIGHT",
+        help="Weight of a scenario in the geometric mean, such as slope-fast=2, and 1 for others"
+        " [default: those of the job or spec]; repeatable.",
+    ),
+]
+
+ScenarioAggregate = Annotated[
+    str | None,
+    typer.Option(
+        metavar="mean|worst",
+        help="Judge designs by the mean over the scenarios, or by the worst one [default: that of"
+        " the job or spec, else mean].",
+    ),
+]
+
 TrajectoryOption = Annotated[
     Path | None,
     typer.Option(
@@ -313,22 +331,8 @@ class SpecOptions(GivenOptions):
             " scenarios differ in it, cycle time.",
         ),
     ] = None
-    scenario_weight: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=WEIGHT",
-            help="Weight of a scenario in the geometric mean, such as slope-fast=2 [default: 1];"
-            " repeatable.",
-        ),
-    ] = None
-    scenario_aggregate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="mean|worst",
-            help="Judge designs by the mean over the scenarios, or by the worst one"
-            " [default: mean].",
-        ),
-    ] = None
+    scenario_weight: ScenarioWeight = None
+    scenario_aggregate: ScenarioAggregate = None
     worlds: Annotated[
         int | None,
         typer.Option(

@@ -91,6 +91,8 @@ class ForkOptions(TypedDict, total=False):
     name: str
     preference: PreferenceInput
     constraints: Sequence[ConstraintInput]
+    scenario_weights: Mapping[str, float]
+    scenario_aggregate: Literal["mean", "worst"]
     optimizer: OptimizerName | OptimizerSettings | Document
     particles: int
     scenarios: ScenarioInput | Iterable[ScenarioInput]

@@ -17,6 +17,8 @@ from gaitswarm.cli.options import (
     JobId,
     NoConstraints,
     NoWorseThan,
+    ScenarioAggregate,
+    ScenarioWeight,
     completed_reference,
 )
 from gaitswarm.cli.output import Parts, Printed, note
@@ -59,17 +61,21 @@ def rank(
     constraint: ConstraintOption = None,
     no_worse_than: NoWorseThan = None,
     no_constraints: NoConstraints = False,
+    scenario_weight: ScenarioWeight = None,
+    scenario_aggregate: ScenarioAggregate = None,
     top: Annotated[int, typer.Option(help="Number of designs to show.")] = 20,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """Rank a job's stored designs by another preference or other constraints."""
-    from gaitswarm.cli.inputs import constraint_choice, preference_choice
+    """Rank a job's stored designs by another preference, other constraints or weights."""
+    from gaitswarm.cli.inputs import constraint_choice, preference_choice, weights_choice
 
     ranking = jobs.ranking(
         job_id,
         None if preference is None else preference_choice(preference),
         constraints=constraint_choice(constraint, no_worse_than, none=no_constraints),
+        scenario_weights=weights_choice(scenario_weight),
+        scenario_aggregate=scenario_aggregate,  # type: ignore[arg-type]
         top=top,
     )
     return ranking, _ranking(ranking)

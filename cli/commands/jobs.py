@@ -22,6 +22,8 @@ from gaitswarm.cli.options import (
     Place,
     Priority,
     RobotOption,
+    ScenarioAggregate,
+    ScenarioWeight,
     SpecOptions,
     completed,
     name_and_bounds,
@@ -302,6 +304,8 @@ def fork(
     constraint: ConstraintOption = None,
     no_worse_than: NoWorseThan = None,
     no_constraints: NoConstraints = False,
+    scenario_weight: ScenarioWeight = None,
+    scenario_aggregate: ScenarioAggregate = None,
     optimizer: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Search method; `gaitswarm optimizers` lists all."),
@@ -351,12 +355,15 @@ def fork(
         optimizer_choice,
         preference_choice,
         scenario_data,
+        weights_choice,
     )
     from gaitswarm.cli.tables import lineage_line
 
     values = {
         "preference": None if preference is None else preference_choice(preference),
         "constraints": constraint_choice(constraint, no_worse_than, none=no_constraints),
+        "scenario_weights": weights_choice(scenario_weight),
+        "scenario_aggregate": scenario_aggregate,
         "optimizer": optimizer_choice(optimizer, optimizer_settings),
         "particles": particles,
         "scenarios": None if scenarios is None else scenario_data(scenarios, robot),

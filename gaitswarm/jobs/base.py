@@ -87,7 +87,6 @@ from gaitswarm.services.optimizer.analysis.utilities import (
 )
 from gaitswarm.services.optimizer.analysis.verdict import VerdictView, verdict
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import duration
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
@@ -105,6 +104,7 @@ from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.service import JobService
@@ -697,7 +697,7 @@ class Jobs(ABC):
     @analysis(
         "POST /jobs/{job_id}/ranking",
         "rank_designs",
-        "Rank designs under another preference or other constraints",
+        "Rank designs under another preference, other constraints or weights",
         body=RankingRequest,
     )
     def ranking(
@@ -706,9 +706,11 @@ class Jobs(ABC):
         preference: PreferenceInput | None = None,
         *,
         constraints: Sequence[ConstraintInput] | None = None,
+        scenario_weights: Mapping[str, float] | None = None,
+        scenario_aggregate: ScenarioAggregate | None = None,
         top: int = 20,
     ) -> RankingView:
-        """Rank all designs of a job under another preference or other constraints.
+        """Rank all designs of a job under another preference, other constraints or weights.
 
         Stored results are judged; at most references of constraints are simulated.
 
@@ -717,6 +719,8 @@ class Jobs(ABC):
                 `Preference`; None: as by the job.
             constraints: Limits that a design must keep, such as "speed>=0.05"; None: those of the
                 job, an empty list: none.
+            scenario_weights: Weights of scenarios in the mean, by name; None: those of the job.
+            scenario_aggregate: `mean` or `worst`; None: that of the job.
             top: How many of the best designs to list, 1 to 1000.
         """
         job = self._service.job(job_id)
@@ -726,9 +730,13 @@ class Jobs(ABC):
                 " preference",
                 field="preference",
             )
-        spec = self._service.under(job.spec, cast("Sequence[Constraint] | None", constraints))
-        if preference is not None:
-            spec = spec.model_copy(update={"preference": preference})
+        spec = self._service.under(
+            job.spec,
+            preference=preference,
+            constraints=constraints,
+            scenario_weights=scenario_weights,
+            scenario_aggregate=scenario_aggregate,
+        )
         return rank(self._service.columns(job), spec, top=top)
 
     def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
@@ -810,7 +818,7 @@ class Jobs(ABC):
         spec, columns = self._tuning(job_id, "objectives to trade")
         vectors = objective_vectors(columns, aggregation=spec.aggregation)
         if constraints is not None:
-            spec = self._service.under(spec, cast("Sequence[Constraint]", constraints))
+            spec = self._service.under(spec, constraints=constraints)
             preference = spec.resolved_preference()
             own = fitness_by(columns, preference, aggregation=spec.aggregation)
             columns = replace(columns, fitness=own)

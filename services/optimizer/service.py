@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 import numpy as np
@@ -19,7 +19,6 @@ from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.analysis.reference import with_references
 from gaitswarm.services.optimizer.errors import ProvenanceChanged, within
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
-from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import checked_spec
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
@@ -40,6 +39,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import other_measure
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
@@ -173,13 +173,12 @@ class JobService:
     def job(self, job_id: str) -> Job:
         return self.store.job(job_id)
 
-    def under(self, spec: JobSpec, constraints: Sequence[Constraint] | None) -> JobSpec:
-        """Return a job's spec under other constraints; None for its own."""
-        if constraints is None:
-            return spec
-        changed = checked_spec(spec, {"constraints": [c.model_dump() for c in constraints]})
+    def under(self, spec: JobSpec, **measure: Any) -> JobSpec:
+        """Return a job's spec with other fields by which it is judged; None keeps one."""
+        changes = other_measure(measure)
+        changed = checked_spec(spec, changes) if changes else spec
         assert isinstance(changed, JobSpec), "the kind does not change"  # noqa: S101
-        return self._referenced(changed)
+        return self._referenced(changed) if "constraints" in changes else changed
 
     def closest(self, job: Job) -> ClosestView | None:
         """Return the design of least violation; None without constraints or with a best design."""

@@ -53,6 +53,21 @@ def test_a_fork_states_why_it_starts_a_new_search(
     assert len(made.json["spec"]["start"]) == 1
 
 
+def test_scenarios_are_weighed_differently_in_forks_and_rankings(
+    gaitswarm: Gaitswarm, finished: Finished, own_db: Path, place: Place
+) -> None:
+    (scenario,) = finished.job["spec"]["scenarios"]
+    weight = ("--scenario-weight", f"{scenario['name']}=2")
+    made = gaitswarm("fork", finished.id, "--from", "1", *weight, *place(own_db), "--json")
+    assert made.json["spec"]["scenario_weights"] == {scenario["name"]: 2.0}
+    assert made.json["lineage"]["changed"] == ["scenario_weights"]
+    worst = ("--scenario-aggregate", "worst")
+    ranked = gaitswarm("rank", finished.id, *worst, *place(own_db), "--json")
+    assert ranked.json["top"][0]["rank_before"] == 1
+    refused = gaitswarm("rank", finished.id, "--scenario-weight", "x=1", *place(own_db))
+    assert refused.code == 2 and "the job has no scenario 'x'" in refused.err
+
+
 def test_the_command_of_a_verdict_forks_a_job_within_wider_bounds(
     gaitswarm: Gaitswarm, db: Path, place: Place
 ) -> None:

@@ -395,6 +395,36 @@ def test_a_fork_is_judged_by_its_own_constraints_without_simulation(store: Store
     assert isinstance(lifted.spec, JobSpec) and lifted.spec.constraints == ()
 
 
+OTHER_WEIGHTS: list[dict[str, Any]] = [
+    {"scenario_weights": {"slope-fast": 4.0}},
+    {"scenario_aggregate": "worst"},
+]
+
+
+@pytest.mark.parametrize("measure", OTHER_WEIGHTS)
+@pytest.mark.parametrize("before", [{}, *OTHER_WEIGHTS])
+def test_a_history_is_forked_and_ranked_with_other_weights_of_scenarios(
+    store: Store, measure: dict[str, Any], before: dict[str, Any]
+) -> None:
+    parent = run(store, spec(FAST, **before))
+    service = JobService(store)
+    columns = store.evaluation_columns(parent.id, 0, 6)
+    assert columns is not None
+    expected = spec(FAST, **measure).judge(columns.objectives, columns.failed).fitness
+
+    request = ForkRequest.model_validate({"from_iteration": 6, "iterations": 7, **measure})
+    fork, _ = service.fork(parent.id, request)
+    assert fork.lineage is not None and fork.lineage.carried == "search"
+    assert isinstance(fork.spec, JobSpec)
+    assert fork.spec.aggregation == spec(**measure).aggregation
+    assert store.job(fork.id).progress.best_fitness == expected.min()
+
+    top = DatabaseJobs(service, "").ranking(parent.id, **measure, top=1000).top
+    assert [design.fitness for design in top] == pytest.approx(
+        sorted(expected[np.isfinite(expected)].tolist())
+    )
+
+
 def test_statuses_count_as_failures_alone(store: Store) -> None:
     job = run(store, spec("reciprocal_speed<=0.01", iterations=1))
     columns = store.evaluation_columns(job.id, 0, 1)

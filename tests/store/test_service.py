@@ -177,7 +177,7 @@ def test_references_of_constraints_that_take_too_long_are_refused_by_name(store:
     for refused in (
         lambda: service.submit(asked),
         lambda: service.estimate(asked),
-        lambda: service.under(job.spec, asked.constraints),
+        lambda: service.under(job.spec, constraints=asked.constraints),
     ):
         with pytest.raises(InvalidRequest, match=r"18 s in total, more than the 17\.9 s") as error:
             refused()

@@ -153,11 +153,11 @@ def _check(spec: Spec, designs: list[Design]) -> None:
         raise ValueError(f"{name} of its best design no. {int(number) + 1}: {problem}") from error
 
 
-_OUTCOMES_HOLD: Final = frozenset({"preference", "constraints", "optimizer", "variables"})
-"""Fields of a spec that do not affect outcomes."""
+_MEASURE: Final = frozenset({"preference", "constraints", "scenario_weights", "scenario_aggregate"})
+"""Fields of a spec by which outcomes are judged."""
 
-_MEASURE: Final = frozenset({"preference", "constraints"})
-"""Those by which outcomes are judged."""
+_OUTCOMES_HOLD: Final = _MEASURE | {"optimizer", "variables"}
+"""Fields that do not affect outcomes."""
 
 _REFERENCES_DEPEND_ON: Final = frozenset({"constraints", "scenarios", "robot"})
 """Fields of a request on which the values of references depend."""

@@ -15,6 +15,7 @@ from gaitswarm.services.optimizer.analysis.utilities import fitness_by, infeasib
 from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, evaluations_of
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate, ScenarioWeights
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View
 
@@ -35,6 +36,12 @@ class RankingRequest(Request):
         description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
         " list: none.",
         examples=[["speed>=0.05"]],
+    )
+    scenario_weights: ScenarioWeights | None = Field(
+        default=None, description="As in a spec; null: those of the job."
+    )
+    scenario_aggregate: ScenarioAggregate | None = Field(
+        default=None, description="As in a spec; null: that of the job."
     )
     top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
 

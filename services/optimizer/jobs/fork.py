@@ -13,6 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
+    ScenarioAggregate,
+    ScenarioWeights,
+    other_measure,
+)
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
@@ -23,7 +28,8 @@ from gaitswarm.sim.scenario import ScenarioChoice
 from gaitswarm.sim.variables import VariableName
 
 _SPEC_FIELDS: Final = (
-    *("name", "preference", "constraints", "optimizer", "scenarios", "robot", "iterations"),
+    *("name", "preference", "constraints", "scenario_weights", "scenario_aggregate"),
+    *("optimizer", "scenarios", "robot", "iterations"),
 )
 """Fields of a request that are also fields of a spec."""
 
@@ -52,6 +58,12 @@ class ForkRequest(BaseModel):
         default=None,
         description="Limits that a design must keep, as in a spec; null: the parent's.",
         examples=[["speed>=0.05"]],
+    )
+    scenario_weights: ScenarioWeights | None = Field(
+        default=None, description="As in a spec; null: the parent's."
+    )
+    scenario_aggregate: ScenarioAggregate | None = Field(
+        default=None, description="As in a spec; null: the parent's."
     )
     optimizer: OptimizerChoice | None = Field(
         default=None, description="Search method and its settings; null: the parent's."
@@ -164,8 +176,7 @@ class Fork:
 
 def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
     """Return the spec of a fork, resolved."""
-    changes = {name: getattr(request, name) for name in _SPEC_FIELDS}
-    changes = {name: value for name, value in changes.items() if value is not None}
+    changes = other_measure({name: getattr(request, name) for name in _SPEC_FIELDS})
     if request.bounds:
         # Start designs may lie outside; the best designs replace them.
         changes |= {"variables": _within(parent, request.bounds), "start": ()}

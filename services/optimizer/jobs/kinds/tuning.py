@@ -24,7 +24,12 @@ from gaitswarm.services.optimizer.jobs.constraints import (
 )
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.designs import Scenarios
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation, TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
+    Aggregation,
+    ScenarioAggregate,
+    ScenarioWeights,
+    TuningWorlds,
+)
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
     Judgement,
@@ -52,9 +57,6 @@ from gaitswarm.sim.worlds import check_worlds
 from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk
 
 Floats = NDArray[np.float64]
-
-
-Weight = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
 
 
 class WalksSpec(Scenarios, Spec):
@@ -200,16 +202,8 @@ class JobSpec(WalksSpec):
         examples=[None, {"count": 8, "aggregate": "cvar"}],
     )
 
-    scenario_weights: dict[str, Weight] = Field(
-        default_factory=dict,
-        description="Weights of scenarios in the geometric mean, by name; 1 for all others.",
-        examples=[{"slope-fast": 2.0}],
-    )
-    scenario_aggregate: Literal["mean", "worst"] = Field(
-        default="mean",
-        description="Aggregate of the utilities of all scenarios: `mean`, their weighted geometric"
-        " mean, or `worst`, the greatest of them.",
-    )
+    scenario_weights: ScenarioWeights = Field(default_factory=dict)
+    scenario_aggregate: ScenarioAggregate = "mean"
 
     @model_validator(mode="after")
     def _has_weighted_scenarios(self) -> JobSpec:

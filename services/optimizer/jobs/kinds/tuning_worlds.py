@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,38 @@ from gaitswarm.sim.worlds import DRAWN, PERTURBATIONS, sample_worlds
 Floats = NDArray[np.float64]
 
 Aggregate = Literal["mean", "quantile", "worst", "cvar"]
+
+Weight = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
+
+ScenarioWeights = Annotated[
+    dict[str, Weight],
+    Field(
+        description="Weights of scenarios in the geometric mean, by name; 1 for all others.",
+        examples=[{"slope-fast": 2.0}],
+    ),
+]
+
+ScenarioAggregate = Annotated[
+    Literal["mean", "worst"],
+    Field(
+        description="Aggregate of the utilities of all scenarios: `mean`, their weighted geometric"
+        " mean, or `worst`, the greatest of them."
+    ),
+]
+
+
+def other_measure(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changed fields of a spec, of those that are not None.
+
+    The worst scenario has no weights: either choice replaces the other.
+    """
+    changes = {name: value for name, value in fields.items() if value is not None}
+    if changes.get("scenario_aggregate") == "worst":
+        changes.setdefault("scenario_weights", {})
+    elif changes.get("scenario_weights"):
+        changes.setdefault("scenario_aggregate", "mean")
+    return changes
+
 
 _EDGE: Final = 1e-9
 """Tolerance in worlds: a share this close to an integer counts as that integer."""

@@ -14,25 +14,13 @@ from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from copy import copy
 from functools import cache
+from importlib import import_module
 from typing import Annotated, Any, Final, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from gaitswarm.cli.commands import (
-    administration,
-    analysis,
-    certify,
-    designs,
-    evidence,
-    jobs,
-    measurements,
-    optimize,
-    plot,
-    robot,
-    serve,
-)
 from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
 from gaitswarm.cli.options import expanded
 from gaitswarm.cli.output import (
@@ -44,52 +32,41 @@ from gaitswarm.cli.output import (
 )
 
 _GROUPS: Final = {
-    "robot": ("Create a robot from a URDF file, and check it.", (robot.init, robot.check)),
+    "robot": ("Create a robot from a URDF file, and check it.", "robot.init robot.check"),
     "plot": (
         "Draw a job's convergence or front, or a controller's surface.",
-        (plot.convergence, plot.front, plot.surface),
+        "plot.convergence plot.front plot.surface",
     ),
     "token": (
         "Create, list and revoke tokens for access to a server.",
-        (administration.create, administration.list_tokens, administration.revoke),
+        "administration.create administration.list_tokens administration.revoke",
     ),
     "db": (
         "Upgrade, check, back up, restore and prune the database.",
         (
-            *(administration.upgrade, administration.check, administration.backup),
-            *(administration.restore, administration.prune),
+            "administration.upgrade administration.check administration.backup"
+            " administration.restore administration.prune"
         ),
     ),
 }
 """Help texts and commands of groups."""
 
-_PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
-    "Start here": (
-        *(optimize.optimize, serve.serve, jobs.submit, jobs.list_jobs, jobs.status, jobs.best),
-        *(designs.simulate, "robot"),
-    ),
-    "Jobs": (
-        *(jobs.watch, jobs.history, jobs.pause, jobs.resume, jobs.extend, jobs.prioritize),
-        *(jobs.cancel, jobs.fork, jobs.label, jobs.keep, jobs.delete, jobs.diff, serve.runner),
-    ),
-    "Analysis of jobs": (
-        *(analysis.verdict, analysis.rank, analysis.front, analysis.importance),
-        *(analysis.failures, analysis.preferences, "plot"),
-        *(evidence.export, evidence.evidence, evidence.verify),
-    ),
-    "Designs": (certify.certify, designs.robustness, designs.firmware),
-    "Robots and measurements": (
-        *(robot.gaits, robot.mjcf, measurements.record, measurements.recordings),
-        *(measurements.identify, measurements.parameters, measurements.calibrate),
-        measurements.targets,
-        measurements.validate,
-    ),
-    "Installation": (
-        *(administration.optimizers, administration.cases, administration.plugins, "token"),
-        *(administration.audit, "db"),
-    ),
+_PANELS: Final = {
+    "Start here": "optimize.optimize serve.serve jobs.submit jobs.list_jobs jobs.status jobs.best"
+    " designs.simulate robot",
+    "Jobs": "jobs.watch jobs.history jobs.pause jobs.resume jobs.extend jobs.prioritize jobs.cancel"
+    " jobs.fork jobs.label jobs.keep jobs.delete jobs.diff serve.runner",
+    "Analysis of jobs": "analysis.verdict analysis.rank analysis.front analysis.importance"
+    " analysis.failures analysis.preferences plot evidence.export evidence.evidence"
+    " evidence.verify",
+    "Designs": "certify.certify designs.robustness designs.firmware",
+    "Robots and measurements": "robot.gaits robot.mjcf measurements.record measurements.recordings"
+    " measurements.identify measurements.parameters measurements.calibrate measurements.targets"
+    " measurements.validate",
+    "Installation": "administration.optimizers administration.cases administration.plugins token"
+    " administration.audit db",
 }
-"""Commands and groups in the order of the help text, by heading."""
+"""Commands, each a module and its function, and groups in the order of the help text."""
 
 
 class _HelpAtOnce(TyperGroup):
@@ -106,7 +83,7 @@ class _HelpAtOnce(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
-        panels = {panel: list(map(_name, entries)) for panel, entries in _PANELS.items()}
+        panels = {panel: list(map(_name, text.split())) for panel, text in _PANELS.items()}
         if "optimize" not in commands:
             panels = {"Commands": list(commands)}
         for panel, names in panels.items():
@@ -174,23 +151,28 @@ def main() -> None:
 @cache
 def commands(only: str | None = None) -> Callable[..., object]:
     """Build one command, or all: building all takes longer than most of them run."""
-    every = {_name(entry): entry for entries in _PANELS.values() for entry in entries}
+    every = {_name(entry): entry for text in _PANELS.values() for entry in text.split()}
     app = copy(_app)
     app.registered_commands, app.registered_groups = [], []
     for name, entry in {only: every[only]}.items() if only in every else every.items():
-        if isinstance(entry, str):
+        if entry in _GROUPS:
             text, members = _GROUPS[entry]
             group = typer.Typer(help=text)
-            for command in members:
-                group.command(_name(command))(expanded(command))
+            for command in members.split():
+                group.command(_name(command))(_function(command))
             app.add_typer(group, name=entry)
         else:
-            app.command(name)(expanded(entry))
+            app.command(name)(_function(entry))
     return get_command(app)
 
 
-def _name(entry: Callable[..., object] | str) -> str:
-    return entry if isinstance(entry, str) else re.sub("_(jobs|tokens)$", "", entry.__name__)
+def _name(entry: str) -> str:
+    return re.sub("_(jobs|tokens)$", "", entry.rpartition(".")[2])
+
+
+def _function(entry: str) -> Callable[..., None]:
+    module, _, name = entry.partition(".")
+    return expanded(getattr(import_module(f"gaitswarm.cli.commands.{module}"), name))
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -12,7 +12,6 @@ from typing import Any, Final, Literal, TypeAlias, TypedDict, TypeVar, Unpack, c
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import invalid_request
-from gaitswarm.robots import read_text, robot_defaults
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
@@ -180,6 +179,8 @@ def _folder_defaults(robot: RobotInput | None, document: Mapping[str, Any]) -> d
         return {}
     if document.get("kind", "tuning") != "tuning":
         return {}
+    from gaitswarm.robots import robot_defaults
+
     return robot_defaults(robot).of_controller(document.get("controller"))
 
 
@@ -214,6 +215,8 @@ def _read_folder(folder: Path) -> dict[str, Any]:
         raise InvalidRequest(
             f"{folder} is not a robot's folder: No such file: {missing}", field="robot"
         )
+    from gaitswarm.robots import read_text
+
     return {kind: read_text(path, field="robot") for kind, path in files.items()}
 
 

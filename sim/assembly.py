@@ -17,7 +17,6 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.feed_forward import carrying_torques
 from gaitswarm.sim.gait.trajectory import Trajectory, desired_angles
-from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.parameters import (
     GRAVITY,
     SHOVE_DURATION,
@@ -75,7 +74,7 @@ def kernel_of(
         raise SimulationInputError(
             f"precision: the reference kernel supports double only, not {precision}"
         )
-    native = None if backend == "reference" else native_kernel(robot, precision, uneven=uneven)
+    native = None if backend == "reference" else _native_kernel(robot, precision, uneven=uneven)
     if native is not None:
         return native
     if backend == "native":
@@ -93,9 +92,15 @@ def kernel_of(
     return reference_kernel(robot, uneven=uneven)
 
 
+def _native_kernel(robot: Robot, precision: Precision, *, uneven: bool = False) -> Kernel | None:
+    from gaitswarm.sim.kernel.native import native_kernel  # noqa: PLC0415 - slow to import
+
+    return native_kernel(robot, precision, uneven=uneven)
+
+
 def has_native_kernel(robot: Robot, precision: Precision = "double") -> bool:
     """Check whether a compiled kernel is available for a robot, without compiling it."""
-    return find_compiler() is not None or native_kernel(robot, precision) is not None
+    return find_compiler() is not None or _native_kernel(robot, precision) is not None
 
 
 def check_precision(robot: Robot, precision: Precision) -> None:

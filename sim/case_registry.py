@@ -17,7 +17,7 @@ from gaitswarm.sim.plugins import MISSING, Plugin, Registry, check_is, check_nam
 class CaseSettings(BaseModel):
     """Base class of cases' settings."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     name: str
 

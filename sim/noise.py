@@ -21,7 +21,7 @@ class LinkNoise(BaseModel):
     (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` adds them.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     link: Literal[1, 2, 3] = Field(description="Links disturbed: 1 coxa, 2 femur, 3 tibia.")
     deviation: float = Field(

@@ -43,7 +43,7 @@ _DIGITS: Final = 32
 class Provenance(BaseModel):
     """Everything that outcomes for a robot depend on. Only results with equal ones may be mixed."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     robot: str = Field(
         description="Name in the robot's file; several separated by commas.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import (
     AfterValidator,
@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import NAME, OWN, alternatives, message_of
+from gaitswarm.sim.input import NAME, OWN, alternatives, check_distinct, message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.terrain import PLANE, Terrain
 from gaitswarm.sim.variables import VariableName, split_name
@@ -403,3 +403,19 @@ ScenarioChoice = Annotated[
     BeforeValidator(_number_as_name),
 ]
 """A scenario in jobs and requests."""
+
+
+class Scenarios(BaseModel):
+    """Scenarios of a request or of a job; each declares the field with its defaults."""
+
+    if TYPE_CHECKING:
+        scenarios: tuple[ScenarioChoice, ...]
+
+    @model_validator(mode="after")
+    def _scenarios_differ(self) -> Self:
+        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """Return the scenarios with presets resolved."""
+        return tuple(map(find_scenario, self.scenarios))

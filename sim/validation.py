@@ -171,7 +171,7 @@ N_HARMONICS: Final = 20
 
 
 class _Data(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class Agreement(_Data):

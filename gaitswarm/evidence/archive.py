@@ -67,7 +67,7 @@ LARGEST_TEXT: Final = 64 << 20
 
 
 class _Document(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, defer_build=True)
 
 
 class JobDocument(_Document):
@@ -98,7 +98,7 @@ class ChainDocument(_Document):
 class Manifest(BaseModel):
     """SHA-256 of every member."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, defer_build=True)
 
     format: Literal["gaitswarm-evidence"] = "gaitswarm-evidence"
     version: Literal[1] = 1  # of the layout; others are refused

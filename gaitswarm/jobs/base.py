@@ -41,56 +41,8 @@ from gaitswarm.jobs.operation import (
     core,
     robots,
 )
-from gaitswarm.recordings import RecordingEntryView, RecordingView
-from gaitswarm.services.optimizer.analysis.candidate_preferences import (
-    CandidatePreferencesView,
-    candidate_preferences,
-)
-from gaitswarm.services.optimizer.analysis.certificate import (
-    MOST_WORST,
-    CertificateView,
-    certificate,
-)
-from gaitswarm.services.optimizer.analysis.comparison import (
-    MOST_JOBS,
-    JobComparisonView,
-    comparison,
-)
-from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
-from gaitswarm.services.optimizer.analysis.failures import FailuresView, failures
-from gaitswarm.services.optimizer.analysis.front import (
-    FRONT_DESIGNS,
-    FrontRequest,
-    FrontView,
-    pareto_front,
-)
-from gaitswarm.services.optimizer.analysis.history import read_columns
-from gaitswarm.services.optimizer.analysis.identifiability import (
-    IdentifiabilityView,
-    check_comparable,
-    identifiability,
-)
-from gaitswarm.services.optimizer.analysis.importance import ImportanceView, importance
-from gaitswarm.services.optimizer.analysis.preferences import (
-    PreferenceForView,
-    preference_for,
-)
-from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
-from gaitswarm.services.optimizer.analysis.reference import with_other_reference, with_reference
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
-from gaitswarm.services.optimizer.analysis.utilities import (
-    fitness_by,
-    infeasible_rows,
-    objective_vectors,
-    require_success,
-    tuning_spec,
-)
-from gaitswarm.services.optimizer.analysis.verdict import VerdictView, verdict
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.estimate import duration
-from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import (
     HIGHEST_PRIORITY,
     LARGEST_BUDGET,
@@ -100,16 +52,10 @@ from gaitswarm.services.optimizer.jobs.job import (
     JobOrder,
     JobState,
 )
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
-from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
-from gaitswarm.sim.identification import RecordedWalk
 from gaitswarm.specs import (
     ConstraintInput,
     ForkOptions,
@@ -121,7 +67,6 @@ from gaitswarm.specs import (
     laid_options,
 )
 from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, encoded_table
-from gaitswarm.views.catalogue import CatalogueView
 from gaitswarm.views.job import (
     BestView,
     EstimateView,
@@ -132,8 +77,36 @@ from gaitswarm.views.job import (
     JobView,
     StateView,
 )
-from gaitswarm.views.verification import Digest, HistoryVerificationView
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
+
+if TYPE_CHECKING:
+    from gaitswarm.jobs.types import (
+        MOST_JOBS,
+        MOST_WORST,
+        CandidatePreferencesView,
+        CatalogueView,
+        CertificateView,
+        Digest,
+        EvaluationColumns,
+        EvaluationView,
+        FailuresView,
+        ForkRequest,
+        FrontView,
+        HistoryVerificationView,
+        IdentifiabilityView,
+        ImportanceView,
+        JobComparisonView,
+        JobSpec,
+        LeaveOut,
+        PreferenceForView,
+        RankingView,
+        RecordedWalk,
+        RecordingEntryView,
+        RecordingView,
+        TargetsView,
+        VerdictView,
+    )
+    from gaitswarm.services.optimizer.service import JobService
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -170,7 +143,7 @@ class Submission(BaseModel):
         notify_url: Receives a document when the job has ended.
     """
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, defer_build=True)
 
     idempotency_key: str | None = None
     priority: Priority = 0
@@ -349,6 +322,8 @@ class Jobs(ABC):
             Conflict: The parent's search cannot be continued, or has no design to start from.
             IdempotencyConflict: The key was used before for another job.
         """
+        from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+
         request = checked(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
         given = {"idempotency_key": idempotency_key, "priority": priority, "notify_url": notify_url}
         return self._fork(job_id, request, checked(Submission, given))
@@ -636,6 +611,14 @@ class Jobs(ABC):
             against: Another reference, which is not stored: `published:NAME`, the id of a job for
                 its best design, or a design as a JSON object of its variables.
         """
+        from gaitswarm.services.optimizer.analysis.reference import (
+            with_other_reference,
+            with_reference,
+        )
+        from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
+        from gaitswarm.services.optimizer.analysis.verdict import verdict
+        from gaitswarm.services.optimizer.jobs.estimate import duration
+
         job = self._service.job(job_id)
         if against is None:
             job, reason = with_reference(self._service.store, job)
@@ -684,6 +667,9 @@ class Jobs(ABC):
         Raises:
             Conflict: The job cannot be read.
         """
+        from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
+        from gaitswarm.views.catalogue import CatalogueView
+
         spec = self._service.job(job_id).spec
         evaluations = self._service.store.evaluations(job_id, iteration)
         return CatalogueView(items=evaluation_views(evaluations, spec))
@@ -698,7 +684,7 @@ class Jobs(ABC):
         "POST /jobs/{job_id}/ranking",
         "rank_designs",
         "Rank designs under another preference, other constraints or weights",
-        body=RankingRequest,
+        body="types.RankingRequest",
     )
     def ranking(
         self,
@@ -723,6 +709,9 @@ class Jobs(ABC):
             scenario_aggregate: `mean` or `worst`; None: that of the job.
             top: How many of the best designs to list, 1 to 1000.
         """
+        from gaitswarm.services.optimizer.analysis.ranking import rank
+        from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+
         job = self._service.job(job_id)
         if not isinstance(job.spec, JobSpec):
             raise InvalidRequest(
@@ -740,11 +729,15 @@ class Jobs(ABC):
         return rank(self._service.columns(job), spec, top=top)
 
     def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
+        from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
+
         job = self._service.job(job_id)
         return tuning_spec(job_id, job.spec, has), self._service.columns(job)
 
     def _feasible(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
         """Return only the designs that keep the job's constraints."""
+        from gaitswarm.services.optimizer.analysis.utilities import infeasible_rows
+
         spec, columns = self._tuning(job_id, has)
         if spec.constraints:
             columns = columns.rows(np.flatnonzero(~infeasible_rows(columns, spec)))
@@ -753,6 +746,8 @@ class Jobs(ABC):
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> FailuresView:
         """Count the failed designs of a job by case and status, from stored statuses."""
+        from gaitswarm.services.optimizer.analysis.failures import failures
+
         job = self._service.job(job_id)
         return failures(self._service.columns(job), job.spec.case_names)
 
@@ -763,6 +758,8 @@ class Jobs(ABC):
         Raises:
             Conflict: It has no design yet.
         """
+        from gaitswarm.services.optimizer.analysis.importance import importance
+
         job = self._service.job(job_id)
         if job.spec.kind == "certificate":
             raise InvalidRequest(
@@ -788,6 +785,8 @@ class Jobs(ABC):
         Args:
             job_ids: 1 to 12 jobs, each once.
         """
+        from gaitswarm.services.optimizer.analysis.comparison import comparison
+
         if len(set(job_ids)) < len(job_ids):
             raise InvalidRequest("must name each job once", field="job_ids")
         jobs = [self._service.job(job_id) for job_id in job_ids]
@@ -797,13 +796,18 @@ class Jobs(ABC):
         ]
         return comparison(self._service.store, jobs, fitness)
 
-    @analysis("POST /jobs/{job_id}/front", "find_front", "Find the Pareto front", body=FrontRequest)
+    @analysis(
+        "POST /jobs/{job_id}/front",
+        "find_front",
+        "Find the Pareto front",
+        body="types.FrontRequest",
+    )
     def front(
         self,
         job_id: str,
         *,
         constraints: Sequence[ConstraintInput] | None = None,
-        most: int = FRONT_DESIGNS,
+        most: int = 1000,
     ) -> FrontView:
         """Find the Pareto front of a job over f1 to f5, from stored objectives.
 
@@ -815,6 +819,14 @@ class Jobs(ABC):
         Raises:
             Conflict: No design of it succeeds in all scenarios.
         """
+        from gaitswarm.services.optimizer.analysis.front import pareto_front
+        from gaitswarm.services.optimizer.analysis.utilities import (
+            fitness_by,
+            infeasible_rows,
+            objective_vectors,
+            require_success,
+        )
+
         spec, columns = self._tuning(job_id, "objectives to trade")
         vectors = objective_vectors(columns, aggregation=spec.aggregation)
         if constraints is not None:
@@ -842,6 +854,9 @@ class Jobs(ABC):
             NotFound: The job has no such design.
             Conflict: The design fails in a scenario, or violates a constraint.
         """
+        from gaitswarm.services.optimizer.analysis.preferences import preference_for
+        from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+
         _, columns = self._tuning(job_id, "objectives to trade")
         place = (columns.iteration == iteration) & (columns.particle == particle)
         if not place.any():
@@ -876,6 +891,11 @@ class Jobs(ABC):
         Raises:
             Conflict: One of them has no feasible design yet.
         """
+        from gaitswarm.services.optimizer.analysis.identifiability import (
+            check_comparable,
+            identifiability,
+        )
+
         jobs = [self._service.job(job_id) for job_id in job_ids]
         check_comparable(jobs)
         runs, spec = [self._service.columns(job) for job in jobs], jobs[0].spec
@@ -898,6 +918,10 @@ class Jobs(ABC):
         Raises:
             Conflict: One of them has no feasible design yet.
         """
+        from gaitswarm.services.optimizer.analysis.identifiability import check_comparable
+        from gaitswarm.services.optimizer.analysis.targets import target_results
+        from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+
         jobs = [self._service.job(job_id) for job_id in job_ids]
         spec = jobs[0].spec
         if not isinstance(spec, CalibrationSpec):
@@ -936,6 +960,9 @@ class Jobs(ABC):
         Raises:
             Conflict: No world was simulated yet.
         """
+        from gaitswarm.services.optimizer.analysis.certificate import certificate
+        from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+
         job = self._service.job(job_id)
         if not isinstance(job.spec, CertificateSpec):
             raise InvalidRequest(
@@ -956,6 +983,11 @@ class Jobs(ABC):
         Raises:
             Conflict: None of them has a feasible optimum yet.
         """
+        from gaitswarm.services.optimizer.analysis.candidate_preferences import (
+            candidate_preferences,
+        )
+        from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
+
         job = self._service.job(job_id)
         if not isinstance(job.spec, PreferencesSpec):
             raise InvalidRequest(
@@ -987,6 +1019,8 @@ class Jobs(ABC):
         Raises:
             Conflict: The job cannot be read.
         """
+        from gaitswarm.services.optimizer.analysis.history import read_columns
+
         job = self._service.job(job_id)
         return encoded_table(format, job.spec, read_columns(self._service.store, job))
 
@@ -1062,6 +1096,8 @@ class Jobs(ABC):
         Args:
             walk: Motor currents of a measured walk. The same walk again is the same recording.
         """
+        from gaitswarm.recordings import RecordingView
+
         recording_id = self._service.store.add_recording(walk, actor=self._context.actor)
         return RecordingView.from_walk(recording_id, walk)
 
@@ -1079,6 +1115,8 @@ class Jobs(ABC):
             search: Only recordings whose id, scenario or controller contain this, ignoring case.
             limit: Maximum number of recordings.
         """
+        from gaitswarm.recordings import RecordingEntryView
+
         page = self._service.store.recording_list(search=search, after=after, limit=limit)
         items = [RecordingEntryView.from_entry(entry) for entry in page.items]
         return PageView[RecordingEntryView](items=items, next=page.next)

@@ -15,9 +15,6 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 from gaitswarm.errors import Interrupted
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
-from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
-from gaitswarm.services.optimizer.analysis.history import read_columns
-from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.errors import (
     Conflict,
     InvalidRequest,
@@ -25,22 +22,19 @@ from gaitswarm.services.optimizer.errors import (
     simulation_errors,
 )
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.iteration import evaluations_of
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
-from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.masking import masked_url
-from gaitswarm.services.optimizer.run.evaluator import Evaluator
-from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.tables import EvaluationTable
 from gaitswarm.views.job import HistoryIterationView, IterationView, JobView, StateView
 
 if TYPE_CHECKING:
-    from gaitswarm.services.runtime import EvaluatorKind
+    from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+    from gaitswarm.services.optimizer.run.evaluator import Evaluator
+    from gaitswarm.services.optimizer.service import JobService
 
 _RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States from which a job continues only by a command."""
@@ -109,6 +103,10 @@ class DatabaseJobs(Jobs):
 
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
         """Read the designs of many iterations at once."""
+        from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
+        from gaitswarm.services.optimizer.analysis.history import read_columns
+        from gaitswarm.services.optimizer.jobs.iteration import evaluations_of
+
         job, iterations = self._service.job(job_id), self.iterations(job_id)
         for columns in read_columns(self._service.store, job):
             views = evaluation_views(evaluations_of(columns), job.spec)
@@ -117,6 +115,8 @@ class DatabaseJobs(Jobs):
 
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Read every evaluation."""
+        from gaitswarm.services.optimizer.analysis.history import read_columns
+
         job = self._service.job(job_id)
         return EvaluationTable.from_pieces(job.spec, read_columns(self._service.store, job))
 
@@ -168,6 +168,7 @@ class DatabaseJobs(Jobs):
             ProvenanceChanged: The provenance has changed, which is not accepted.
             EvaluatorUnavailable: The cluster cannot be reached.
         """
+        from gaitswarm.services.optimizer.analysis.reference import note_reference
         from gaitswarm.services.runtime import open_evaluator, run_embedded
 
         check_workers(evaluator, cpus)
@@ -229,8 +230,6 @@ class DatabaseJobs(Jobs):
 
 def check_workers(evaluator: EvaluatorKind | Evaluator, cpus: int | None) -> None:
     """Raise InvalidRequest for an unknown kind of workers, or less than one thread."""
-    from gaitswarm.services.runtime import EvaluatorKind
-
     kinds = get_args(EvaluatorKind)
     if isinstance(evaluator, str) and evaluator not in kinds:
         raise InvalidRequest(f"{evaluator!r} is none of {', '.join(kinds)}", field="evaluator")
@@ -251,6 +250,9 @@ def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
 
 def _submitted(spec: Spec) -> Spec:
     """Return a spec without what is looked up at submission."""
+    from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+
     if isinstance(spec, PreferencesSpec):
         return spec.model_copy(update={"tuning": _submitted(spec.tuning)})
     return spec.without_references() if isinstance(spec, JobSpec) else spec

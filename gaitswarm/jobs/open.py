@@ -40,7 +40,7 @@ def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
     """
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.services.optimizer.service import JobService
-    from gaitswarm.services.runtime import open_store
+    from gaitswarm.services.optimizer.store import open_store
     from gaitswarm.settings import read_settings
 
     settings = read_settings(db=None if db is None else os.fspath(db))

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial, wraps
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar, cast, get_type_hints
 
 from pydantic import BaseModel, Field, TypeAdapter, create_model
@@ -127,13 +128,20 @@ def docstring_of(function: Callable[..., Any]) -> Docstring:
     )
 
 
+def _types() -> ModuleType:
+    from gaitswarm.jobs import types
+
+    return types
+
+
 @dataclass(frozen=True, eq=False)
 class Operation:
     """A method of `Jobs` and its request.
 
     The arguments that the path does not name are the query of a GET. Otherwise they are the body:
-    a model of that name, or of that class; without `body`, the only one is the whole body, and with
-    AnySpec a spec and options are combined to it.
+    a model of that name, or of that class, which may be "types." and its name in `jobs.types`;
+    without `body`, the only one is the whole body, and with AnySpec a spec and options are combined
+    to it.
 
     Attributes:
         function: Computes the answer in this process.
@@ -186,7 +194,10 @@ class Operation:
     @cached_property
     def hints(self) -> dict[str, Any]:
         """Types of the arguments, and of the answer as `return`."""
-        return get_type_hints(self.function, include_extras=True)
+        try:
+            return get_type_hints(self.function, include_extras=True)
+        except NameError:
+            return get_type_hints(self.function, None, vars(_types()), include_extras=True)
 
     @property
     def result(self) -> Any:
@@ -226,6 +237,8 @@ class Operation:
         fields = dict(map(self._field, self.names))
         base = BaseModel if self.body is None else Request
         name = self.body or f"{self.id}_query"
+        if name.startswith("types."):
+            return getattr(_types(), name.removeprefix("types."))
         return create_model(name, __base__=base, __doc__=f"{self.summary}.", **fields)
 
     def _field(self, name: str) -> tuple[str, Any]:

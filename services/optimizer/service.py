@@ -42,8 +42,6 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import other_measure
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
-from gaitswarm.services.optimizer.run.runner import runner_name
 from gaitswarm.sim.identification import RecordedWalk
 
 if TYPE_CHECKING:
@@ -140,6 +138,10 @@ class JobService:
 
     def submit_embedded(self, spec: Spec) -> Claim:
         """Validate a job and store it claimed by this process."""
+        # Slow to import.
+        from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS  # noqa: PLC0415
+        from gaitswarm.services.optimizer.run.runner import runner_name  # noqa: PLC0415
+
         self._check(spec)
         return self.store.create_claimed_job(
             self._resolved(spec),

@@ -123,7 +123,7 @@ GroupName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}$")]
 class Leg(Data):
     """One leg: three joints of the URDF from the body outwards, and the frame of its foot."""
 
-    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True, defer_build=True)
 
     name: Annotated[PartName, Field(max_length=LONGEST_LEG_NAME)]
     phase: Number = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")

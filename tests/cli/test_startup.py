@@ -26,10 +26,23 @@ def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
     assert loaded_by(statements, HEAVY) == set()
 
 
+RARE = (
+    "scipy", "casadi", "pinocchio", "ray", "fastapi", "matplotlib", "pyarrow", "alembic",
+    "gaitswarm.cli.commands.analysis", "gaitswarm.jobs.server", "gaitswarm.jobs.types",
+    "gaitswarm.robots", "gaitswarm.services.optimizer.jobs.designs", "gaitswarm.services.runtime",
+    "gaitswarm.services.optimizer.run.runner", "gaitswarm.sim.kernel.native",
+    "gaitswarm.simulation",
+)  # fmt: skip
+
+
 @pytest.mark.slow
-def test_commands_on_a_database_import_no_rarely_needed_packages() -> None:
-    rare = ("scipy", "casadi", "pinocchio", "ray", "fastapi", "matplotlib", "pyarrow")
-    assert loaded_by("import gaitswarm.jobs.database", rare) == set()
+@pytest.mark.parametrize("command", [["list"], ["status", "{id}"]])
+def test_list_and_status_import_neither_analyses_nor_what_simulates(
+    finished: Finished, command: list[str]
+) -> None:
+    arguments = [part.format(id=finished.id) for part in command] + ["--db", str(finished.db)]
+    statements = f"from gaitswarm.cli.main import run; assert run({arguments}) == 0"
+    assert loaded_by(statements, RARE) == set()
 
 
 def test_help_is_that_of_the_innermost_command(

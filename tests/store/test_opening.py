@@ -87,7 +87,7 @@ def test_the_newest_revision_is_the_head_of_all_migrations() -> None:
     assert scripts.get_heads() == [head()]
 
 
-@pytest.mark.thorough("test_commands_on_a_database_import_no_rarely_needed_packages")
+@pytest.mark.thorough("test_list_and_status_import_neither_analyses_nor_what_simulates")
 @pytest.mark.slow
 def test_a_database_is_made_and_opened_without_alembic(tmp_path: Path) -> None:
     path = str(tmp_path / "jobs.db")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
@@ -17,10 +17,9 @@ from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
-from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, Scenarios
 from gaitswarm.sim.simulate import Simulation, check_drives, check_reach, simulate
 from gaitswarm.sim.variables import VariableName, VariableValue
 from gaitswarm.sim.worlds import MeasuredPerturbedWalk, check_worlds
@@ -82,22 +81,6 @@ class DesignRequest(Request):
         names, values = tuple(self.design), tuple(self.numbers.values())
         with simulation_errors(field):
             check_reach(scenario, names, values, robot=self.robot)
-
-
-class Scenarios(BaseModel):
-    """Scenarios of a request or of a job; each declares the field with its defaults."""
-
-    if TYPE_CHECKING:
-        scenarios: tuple[ScenarioChoice, ...]
-
-    @model_validator(mode="after")
-    def _scenarios_differ(self) -> Self:
-        check_distinct("scenarios", [scenario.name for scenario in self.resolved_scenarios()])
-        return self
-
-    def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """Return the scenarios with presets resolved."""
-        return tuple(map(find_scenario, self.scenarios))
 
 
 class ScenariosRequest(Scenarios, DesignRequest):

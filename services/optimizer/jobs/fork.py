@@ -109,7 +109,7 @@ class ForkRequest(BaseModel):
 class Lineage(BaseModel):
     """Origin of a forked job."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     parent: str = Field(
         description="Identifier of the parent job, which may have been deleted since.",

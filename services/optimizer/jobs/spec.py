@@ -62,7 +62,7 @@ StartDesign = Annotated[
 class EarlierJobs(BaseModel):
     """The best designs of earlier jobs, looked up once, at submission."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     jobs: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = Field(
         min_length=1,

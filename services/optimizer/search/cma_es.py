@@ -64,7 +64,7 @@ class CmaEsSettings(SearchSettings):
 class DistributionState(BaseModel):
     """State of a `NormalDistribution`, in unit coordinates."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(extra="forbid", strict=True, defer_build=True)
 
     mean: Numbers  # (d,)
     sigma: PositiveFloat  # overall standard deviation

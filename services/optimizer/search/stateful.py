@@ -87,7 +87,7 @@ Fitness = Annotated[
 class SearchState(BaseModel):
     """State of a search; asked: number of positions that wait for their fitness."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(extra="forbid", strict=True, defer_build=True)
 
     optimizer: str
     schema_version: int

@@ -23,7 +23,6 @@ from gaitswarm.services.optimizer.jobs.constraints import (
     violations,
 )
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.designs import Scenarios
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
     Aggregation,
     ScenarioAggregate,
@@ -50,7 +49,7 @@ from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, RESULTS, Objective
 from gaitswarm.sim.plugins import PluginSettings
-from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
+from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice, Scenarios
 from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_worlds

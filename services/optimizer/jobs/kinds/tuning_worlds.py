@@ -61,7 +61,7 @@ _EDGE: Final = 1e-9
 class TuningWorlds(BaseModel):
     """A set of worlds, shared by all designs and scenarios: common random numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     count: int = Field(
         default=8, ge=1, le=100, description="Number of worlds; every design is simulated in each."

@@ -107,11 +107,7 @@ class TokenCache:
         return token
 
     async def until_revoked(self, secret: str) -> None:
-        """Return when a token was revoked, at most `CACHE_SECONDS` later.
-
-        All callers with the same secret share one lookup. While the database is unavailable,
-        tokens count as valid.
-        """
+        """Return when a token was revoked, at most `CACHE_SECONDS` later."""
         while True:
             async with self._watching:
                 try:

@@ -164,11 +164,7 @@ class Topic:
         self._changed.set()
 
     async def news(self, after: int | None, *, known: int | None = None) -> News | None:
-        """Return the job and its iterations after an index; None when the server stops.
-
-        known: the caller's version; waits until there is a later one. Streams with the same
-        question share one read.
-        """
+        """Return the job and its iterations after an index; None when the server stops."""
         if known == self.version and not self._ended.done():
             await self._changed.wait()
         read = self._reads.get(after)
@@ -277,12 +273,7 @@ async def job_events(
     *,
     pause_seconds: float,
 ) -> AsyncGenerator[bytes, None]:
-    """Yield committed iterations, then changes of the state, then wait for the next change.
-
-    The events of one read are one text. No transaction is open while waiting. Ends after a terminal
-    state, after `query.limit` iterations, when the server stops, when the job is deleted, or after
-    the committed iterations unless `query.follow`.
-    """
+    """Yield committed iterations, then changes of the state, then wait for the next change."""
     after = query.after
     sent_state: tuple[JobState, str | None] | None = None
     version: int | None = None

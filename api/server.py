@@ -65,12 +65,7 @@ class ApiServer:
         self._socket, self.url = _listen(settings.api_host, settings.api_port)
 
     def run(self) -> None:
-        """Serve until `stop`, or until SIGINT or SIGTERM in the main thread.
-
-        On the first signal `drain` runs while requests are still answered. Then the server accepts
-        no more connections, event streams end, and open requests finish. A second signal stops
-        at once. Returns normally, so that the caller can close its resources.
-        """
+        """Serve until `stop`, or until SIGINT or SIGTERM in the main thread."""
         try:
             self._server.run(sockets=[self._socket])
         finally:
@@ -131,10 +126,7 @@ def metrics_server(
     settings: Settings,
     trouble: Callable[[], str | None],
 ) -> Iterator[str]:
-    """Serve metrics and a liveness probe of a process without an API, inside the block.
-
-    Yields the URL of the metrics.
-    """
+    """Serve metrics and a liveness probe of a process without an API, inside the block."""
 
     def healthz(_request: Request) -> Response:
         problem = trouble()

@@ -57,10 +57,7 @@ class Embedded:
         self._evaluator: Evaluator | None = None
 
     def resumed(self, job_id: str, spec: Spec | None) -> Job:
-        """Return an earlier job, ready to run; raise Conflict if it cannot be resumed.
-
-        spec: if given again, it must be that of the job.
-        """
+        """Return an earlier job, ready to run; raise Conflict if it cannot be resumed."""
         if spec is not None:
             check_same(self.service.job(job_id).spec, spec, job_id)
         return taken_up(self.service, job_id, accept_changes=self._accepts_changes)
@@ -129,12 +126,7 @@ class Embedded:
         return stop.is_set()
 
     def run_to_end(self, spec: Spec, *, any_budget: bool = False) -> Job:
-        """Run an earlier job of the same spec, or a new one, to its end.
-
-        any_budget: accept a job of another budget, extended if it is smaller.
-
-        Raises JobEnded if it does not succeed, and KeyboardInterrupt after a signal.
-        """
+        """Run an earlier job of the same spec, or a new one, to its end."""
         service, claim = self.service, None
         job = earlier_job(service, spec, any_budget=any_budget)
         if job is not None and job.spec.budget < spec.budget:
@@ -178,10 +170,7 @@ def run_seeds(
     *,
     report_command: str,
 ) -> Printed:
-    """Run jobs that differ in their seed one after another, then report on all.
-
-    report_command: the command that prints the report later, for users who interrupt.
-    """
+    """Run jobs that differ in their seed one after another, then report on all."""
     with closing(Embedded(workers)) as embedded:
         jobs = embedded.jobs
         submitted = [embedded.service.submit(spec)[0] for spec in specs]
@@ -207,10 +196,7 @@ def finish(
     as_json: bool,
     others: Mapping[str, JobView],
 ) -> None:
-    """Print the result, next to those of other jobs of the same problem by label.
-
-    Raises KeyboardInterrupt if interrupted, JobEnded unless it succeeded.
-    """
+    """Print the result, next to those of other jobs of the same problem by label."""
     job = jobs.job(job_id)
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)

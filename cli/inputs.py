@@ -180,10 +180,7 @@ def _merge_worlds(fields: dict[str, Any], worlds: object) -> None:
 
 
 def optimizer_choice(name: str | None, settings: str | None) -> Any:
-    """Return the unchecked field `optimizer` of a spec; None if both arguments are.
-
-    settings: JSON, or a file of JSON.
-    """
+    """Return the unchecked field `optimizer` of a spec; None if both arguments are."""
     if settings is None:
         return name
     fields: dict[str, Any] = {} if name is None else {"optimizer": name}
@@ -195,10 +192,7 @@ def optimizer_choice(name: str | None, settings: str | None) -> Any:
 def constraint_choice(
     limits: Sequence[str] | None, no_worse_than: str | None, *, none: bool = False
 ) -> list[Any] | None:
-    """Return the unchecked field `constraints` of a spec; None unless any option was passed.
-
-    none: whether all constraints are lifted.
-    """
+    """Return the unchecked field `constraints` of a spec; None unless any option was passed."""
     if none:
         if limits or no_worse_than is not None:
             raise InvalidRequest("cannot be combined with constraints", field="no-constraints")
@@ -257,13 +251,7 @@ def robot_defaults(text: str | None) -> RobotDefaults:
 
 
 def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, Any]]:
-    """Return the unchecked field `scenarios` of a spec: names, numbers and contents of files.
-
-    If the robot's folder has scenarios, `all` and numbers refer to these, and their names take
-    precedence over presets.
-
-    text: `all`, or names, numbers and FILE.json, separated by commas.
-    """
+    """Return the unchecked field `scenarios` of a spec: names, numbers and contents of files."""
     defaults = robot_defaults(robot)
     if text == "all":
         return defaults.scenarios

@@ -143,10 +143,7 @@ class Stdout:
 
 
 def replace_closed_streams() -> None:
-    """Open the null device for standard streams closed at start, as by `>&-`.
-
-    Otherwise, the next files opened would get their descriptors.
-    """
+    """Open the null device for standard streams closed at start, as by `>&-`."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec
-    from gaitswarm.sim.outcome import Measurement, Objective
+    from gaitswarm.sim.outcome import Objective
     from gaitswarm.sim.variables import Variable
     from gaitswarm.simulation import PlannedGaitView, SimulationView
     from gaitswarm.views.job import BestView, JobSummaryView, JobView, Spent
@@ -56,13 +56,7 @@ def table(
     title: str | None = None,
     gap: int = 2,
 ) -> Table:
-    """Return a table.
-
-    headings: the first column and those marked by `<` are aligned left, all others right; None for
-        a table without headings, aligned left.
-    rows: of texts, integers, floats with four digits, None for a missing value, or pairs of text
-        and style.
-    """
+    """Return a table."""
     from rich.table import Table
 
     made = Table(box=None, title=title, title_justify="left", padding=(0, gap, 0, 0))
@@ -201,10 +195,7 @@ def results_table(
     designs: Mapping[str, Mapping[str, ScenarioResultView]],
     objectives: Sequence[Objective | ObjectiveView],
 ) -> Table:
-    """Return a table of results by scenario, with one row per design.
-
-    Utility and objectives are minimized.
-    """
+    """Return a table of results by scenario, with one row per design."""
     rows: list[Sequence[Any]] = []
     for scenario in next(iter(designs.values())):
         if len(designs) > 1:
@@ -225,7 +216,7 @@ def results_table(
 
 def measurements_tables(
     results: Mapping[str, Mapping[str, float | None]],
-    measurements: Sequence[Objective | ObjectiveView | Measurement],
+    measurements: Sequence[Objective | ObjectiveView],
 ) -> Iterator[Table]:
     """Yield tables of measurements by scenario, each as wide as a terminal."""
     for first in range(0, len(measurements), 5):

@@ -25,10 +25,7 @@ REPORT: Final = "report.md"
 def write_report(
     folder: Path, comparison: Comparison, pair: Synchronised, facts: Mapping[str, str]
 ) -> Path:
-    """Write `report.md` and its pictures, and return the report's path.
-
-    facts: rows of its first table, by heading.
-    """
+    """Write `report.md` and its pictures, and return the report's path."""
     from gaitswarm.cli import pictures
 
     try:

@@ -117,10 +117,7 @@ def mesh_content(folders: Sequence[Path], digest: str, number: int) -> bytes:
 def copy_meshes(
     urdf: str, folder: Path, output: Path, packages: Packages = ()
 ) -> tuple[list[str], dict[str, str]]:
-    """Copy the meshes that a URDF names to their `own_place` next to its copy.
-
-    Returns the names that were copied, and the reasons for those that were left out.
-    """
+    """Copy the meshes that a URDF names to their `own_place` next to its copy."""
     sources: dict[Path, Path] = {}
     copied, left_out = [], dict[str, str]()
     for name in mesh_names(urdf):

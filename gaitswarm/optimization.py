@@ -40,10 +40,7 @@ class OptimizationResult:
 
     @property
     def best(self) -> BestView:
-        """The design of least fitness in double precision, with its result in every scenario.
-
-        Raises NotFound if no design has succeeded in every scenario.
-        """
+        """The design of least fitness in double precision, with its result in every scenario."""
         if self.job.best is None:
             raise NotFound(f"job {self.job.id} has no design that succeeds in every scenario")
         return self.job.best

@@ -129,10 +129,7 @@ class MeasuredWalkRequest(DesignRequest):
 def read_measured_walk(
     request: MeasuredWalkRequest, store: Callable[[RecordedWalk], str]
 ) -> MeasuredWalkView:
-    """Read a log, find its lag from the simulated design, and store a recording of it.
-
-    store: returns the recording's id.
-    """
+    """Read a log, find its lag from the simulated design, and store a recording of it."""
     request.check_design()
     scenario, design = find_scenario(request.scenario), request.numbers
     robot = load_robot(request.robot)

@@ -113,10 +113,7 @@ def laid_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def checked(kind: type[M], arguments: Mapping[str, Any]) -> M:
-    """Validate keyword arguments as a request; None leaves a field at its default.
-
-    Raises InvalidRequest that names the argument.
-    """
+    """Validate keyword arguments as a request; None leaves a field at its default."""
     given = {name: value for name, value in arguments.items() if value is not None}
     try:
         return kind.model_validate(laid_options(given))
@@ -246,11 +243,7 @@ def start_from(
 
 
 def read_designs(path: Path, count: int | None = None) -> tuple[Design, ...]:
-    """Read designs from a CSV file: one row a design, one column a variable.
-
-    A file of `gaitswarm export` works: its columns that begin with `design.` are the
-    variables. Rows without a fitness, where there is such a column, have failed and are left out.
-    """
+    """Read designs from a CSV file: one row a design, one column a variable."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(_rows(csv.DictReader(file, strict=True)))

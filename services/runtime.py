@@ -263,11 +263,7 @@ def open_runtime(
 
 @contextmanager
 def _set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
-    """Yield a function with which signal handlers set events safely.
-
-    A handler may interrupt its thread inside `Event.wait`, which holds the lock that `Event.set`
-    needs: setting the event directly would deadlock.
-    """
+    """Yield a function with which signal handlers set events safely."""
     events: SimpleQueue[threading.Event | None] = SimpleQueue()
 
     def set_them() -> None:
@@ -288,10 +284,7 @@ def _set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
 def stop_on_signals(
     stop: threading.Event, at_once: threading.Event | None = None
 ) -> Iterator[None]:
-    """Set events on SIGINT and SIGTERM inside the block. For the main thread only.
-
-    A SIGINT after all of them are set raises KeyboardInterrupt.
-    """
+    """Set events on SIGINT and SIGTERM inside the block. For the main thread only."""
     left = deque(event for event in (stop, at_once) if event is not None)
 
     def _handle(number: int, _frame: FrameType | None) -> None:

@@ -203,12 +203,7 @@ def unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def numbers_from_booleans(document: Any, value: Any) -> Iterator[tuple[str | int, ...]]:
-    """Yield where a document has true or false, of which validation has made a number.
-
-    Args:
-        document: As parsed from JSON.
-        value: What it was validated to, with models as dictionaries.
-    """
+    """Yield where a document has true or false, of which validation has made a number."""
     if isinstance(document, bool):
         if type(value) in (int, float):
             yield ()

@@ -57,7 +57,7 @@ _PHRASES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """A quantity to be minimized: name in tables and JSON, unit, and description."""
+    """A column of results, minimized or measured: name in tables and JSON, unit, description."""
 
     name: str
     unit: str
@@ -83,34 +83,25 @@ in every column. Preferences weigh its absolute value (eq. 3.1), so fitness igno
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Measurement:
-    """A quantity besides the objectives: name in tables and JSON, unit, and description."""
-
-    name: str
-    unit: str
-    description: str
-
-
-MEASUREMENTS: Final[tuple[Measurement, ...]] = (
-    Measurement("peak_current", "A", "largest absolute current of any motor at any physics step"),
-    Measurement("mean_current", "A", "mean over time and motors of the absolute current"),
-    Measurement("motor_heat", "W", "mean heat of all windings, R I^2"),
-    Measurement("power", "W", "mean electrical power of all motors, as counted by f4"),
-    Measurement("speed", "m/s", "mean speed in the direction of the walk"),
-    Measurement(
+MEASUREMENTS: Final[tuple[Objective, ...]] = (
+    Objective("peak_current", "A", "largest absolute current of any motor at any physics step"),
+    Objective("mean_current", "A", "mean over time and motors of the absolute current"),
+    Objective("motor_heat", "W", "mean heat of all windings, R I^2"),
+    Objective("power", "W", "mean electrical power of all motors, as counted by f4"),
+    Objective("speed", "m/s", "mean speed in the direction of the walk"),
+    Objective(
         "peak_torque",
         "N m",
         "largest absolute torque that any gear passes to its link at any physics step",
     ),
-    Measurement("roll", "deg", "largest absolute roll of the body against the ground's plane"),
-    Measurement("pitch", "deg", "largest absolute pitch of the body against the ground's plane"),
-    Measurement(
+    Objective("roll", "deg", "largest absolute roll of the body against the ground's plane"),
+    Objective("pitch", "deg", "largest absolute pitch of the body against the ground's plane"),
+    Objective(
         "foot_clearance",
         "m",
         "largest height of a sole above the ground in a gait cycle, least of all legs and cycles",
     ),
-    Measurement(
+    Objective(
         "slip", "m/m", "distance that feet slide on the ground, mean of all feet, per metre walked"
     ),
 )
@@ -122,7 +113,7 @@ N_MEASUREMENTS: Final = len(MEASUREMENTS)
 OBJECTIVES_VERSION: Final = 2
 """Version of `OBJECTIVES` in provenances. In version 1, f6 was end height less start height."""
 
-RESULTS: Final = (*OBJECTIVES, *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS))
+RESULTS: Final = (*OBJECTIVES, *MEASUREMENTS)
 """All results of a walk, f1 to f6 first."""
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)

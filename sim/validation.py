@@ -75,11 +75,7 @@ def mean_absolute(signal: Floats) -> float:
 
 
 def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]:
-    """Return frequencies (F,) [Hz] and one-sided amplitudes (F,) or (F, C), F = T // 2 + 1.
-
-    A sine of amplitude A that fits the T rows a whole number of times shows as A in its own bin
-    and nowhere else, hence signals must span whole walking cycles; bin 0 is the absolute mean.
-    """
+    """Return frequencies (F,) [Hz] and one-sided amplitudes (F,) or (F, C), F = T // 2 + 1."""
     rows = len(_samples(signal))
     amplitude = np.abs(np.fft.rfft(signal, axis=0)) * (2.0 / rows)
     amplitude[0] /= 2.0
@@ -89,11 +85,7 @@ def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]
 
 
 def spectral_error(measured: Floats, simulated: Floats, timestep: float) -> float:
-    """|| A - B || / || A || [1] of the amplitude spectra A, B: 0 for a pure delay.
-
-    Norms run over frequencies and signals, so that strong oscillations weigh more than the many
-    bins of noise. The mean value (bin 0) is excluded, as MAE covers it.
-    """
+    """|| A - B || / || A || [1] of the amplitude spectra A, B: 0 for a pure delay."""
     _error(measured, simulated)
     of_measured, of_simulated = (
         amplitude_spectrum(signal, timestep)[1][1:] for signal in (measured, simulated)

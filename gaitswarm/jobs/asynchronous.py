@@ -58,11 +58,7 @@ class AsyncJobs:
     """
 
     def __init__(self, jobs: Jobs) -> None:
-        """Call the methods of jobs in threads.
-
-        Args:
-            jobs: On a server or in a database; closed with this.
-        """
+        """Call the methods of jobs in threads."""
         self._jobs = jobs
 
     @property

@@ -61,10 +61,7 @@ class DatabaseJobs(Jobs):
 
     @property
     def place(self) -> str:
-        """Options by which a command reaches the same jobs; none for the default database.
-
-        A password is masked.
-        """
+        """Options by which a command reaches the same jobs; none for the default database."""
         if self._url == str(default_database()):
             return ""
         return f" --db {shlex.quote(masked_url(self._url))}"
@@ -259,10 +256,7 @@ def _submitted(spec: Spec) -> Spec:
 
 
 def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
-    """Resume a paused or failed job; return any other as it is.
-
-    Raises Conflict if it was cancelled, and ProvenanceChanged if that is not accepted.
-    """
+    """Resume a paused or failed job; return any other as it is."""
     job = service.job(job_id)
     if job.state is JobState.CANCELLED:
         raise Conflict(f"job {job_id} was cancelled, which is final; start a new one")
@@ -272,10 +266,7 @@ def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
 
 
 def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) -> Job | None:
-    """Find a job of the same spec and name that was not cancelled and has today's provenance.
-
-    any_budget: whether its number of iterations may differ.
-    """
+    """Find a job of the same spec and name that was not cancelled and has today's provenance."""
     wanted = _submitted(spec.resolved())
     for job in every(lambda after: service.store.jobs(search=spec.name, after=after)):
         if not job.readable or job.state is JobState.CANCELLED:
@@ -295,10 +286,7 @@ def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) ->
 
 @contextmanager
 def ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
-    """Yield an event that the first Ctrl-C sets, as it sets `stop`; the second one interrupts.
-
-    Nothing changes where Python's own handler is not in place, or outside the main thread.
-    """
+    """Yield an event that the first Ctrl-C sets, as it sets `stop`; the second one interrupts."""
     pressed = threading.Event()
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

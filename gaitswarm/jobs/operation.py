@@ -254,10 +254,7 @@ class Operation:
         return name, (annotation, ... if default is inspect.Parameter.empty else default)
 
     def validated(self, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], BaseModel | None]:
-        """Split arguments into parameters of the path and the request.
-
-        Raises InvalidRequest that names the argument.
-        """
+        """Split arguments into parameters of the path and the request."""
         given = dict(arguments)
         if "job_ids" in given:
             job_ids = given.pop("job_ids")

@@ -84,11 +84,7 @@ class ServerJobs(Jobs):
         headers: Mapping[str, str] | None = None,
         transport: httpx2.BaseTransport | None = None,
     ) -> None:
-        """Create a client, as `gaitswarm.connect` does; nothing is sent yet.
-
-        `reconnect` has the waits before a broken event stream is resumed; every event resets them.
-        `transport` sends requests in place of httpx2's own.
-        """
+        """Create a client, as `gaitswarm.connect` does; nothing is sent yet."""
         self._url = server_url(url)
         self._backoff = backoff
         self._reconnect = reconnect
@@ -220,10 +216,7 @@ class ServerJobs(Jobs):
         repeatable: bool = True,
         stream: bool = False,
     ) -> httpx2.Response:
-        """Return a successful response, after as many attempts as necessary and allowed.
-
-        repeatable: whether it is safe to send the request again.
-        """
+        """Return a successful response, after as many attempts as necessary and allowed."""
         headers = dict(headers or {})
         if body is not None:
             headers["Content-Type"] = "application/json"
@@ -285,10 +278,7 @@ def server_url(url: str) -> str:
 
 
 def authorities(url: str) -> ssl.SSLContext | bool:
-    """Return the trusted authorities: the usual ones for https, none otherwise.
-
-    Reading the usual ones takes longer than most requests.
-    """
+    """Return the trusted authorities: the usual ones for https, none otherwise."""
     return urlsplit(url).scheme == "https" or ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 
 

@@ -343,11 +343,7 @@ class JobView(JobSummaryView):
 
     @property
     def spec(self) -> AnySpec:
-        """The spec.
-
-        Raises:
-            Unreadable: This version cannot read it; says why, and what to do.
-        """
+        """The spec."""
         if self.stored_spec is None:
             raise Unreadable(f"job {self.id}: {self.error}")
         return self.stored_spec

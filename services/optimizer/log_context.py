@@ -15,11 +15,7 @@ _fields: ContextVar[Mapping[str, str | int]] = ContextVar("log_fields", default=
 
 @contextmanager
 def log_context(**fields: str | int | None) -> Iterator[None]:
-    """Attach fields to messages logged inside the block.
-
-    They apply to the thread or asynchronous task that enters the block and to threads that anyio
-    runs for it; threads started inside enter a block of their own.
-    """
+    """Attach fields to messages logged inside the block."""
     given = {name: value for name, value in fields.items() if value is not None}
     token = _fields.set({**_fields.get(), **given})
     try:

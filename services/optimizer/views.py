@@ -87,10 +87,7 @@ MEDIA_TYPE: Final = "application/octet-stream"
 
 
 def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
-    """Encode a JSON header followed by little-endian float32 numbers.
-
-    The numbers begin at a multiple of four bytes, as typed arrays require.
-    """
+    """Encode a JSON header followed by little-endian float32 numbers."""
     text = header.model_dump_json().encode()
     text += b" " * (-len(text) % 4)
     with np.errstate(over="ignore"):

@@ -205,11 +205,7 @@ class Dispatcher:
         return Load(slots, used, pending + running - used)
 
     def most_submitted(self, request: EvaluationRequest, slots: int) -> int:
-        """Return how many tasks a job may have submitted: its share by weight of all slots.
-
-        An engine runs tasks in the order of their submission, so that jobs get slots in proportion
-        to their submitted tasks.
-        """
+        """Return how many tasks a job may have submitted: its share by weight of all slots."""
         with self._lock:
             total = sum(each.request.weight for each in self._active)
         share = request.weight / total if total else 1.0

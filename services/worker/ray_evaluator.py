@@ -107,10 +107,7 @@ class RayEvaluator:
         return "Ray is unreachable; it is opened again for the next iteration"
 
     def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
-        """Return when Ray is open, and close this evaluator if it cannot be.
-
-        Raises EvaluatorUnavailable then, and EvaluationStopped once `should_stop` returns true.
-        """
+        """Return when Ray is open, and close this evaluator if it cannot be."""
         try:
             awaited(self._connection.opened, should_stop)
         except (EvaluationStopped, EvaluatorUnavailable):

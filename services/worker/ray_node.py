@@ -46,10 +46,7 @@ runpy.run_module("ray.scripts.scripts", run_name="__main__")
 
 
 def runs_here(port: int) -> bool:
-    """Return whether a node of a cluster runs on this machine; True if processes are not listed.
-
-    port: that of the head's control service.
-    """
+    """Return whether a node of a cluster runs on this machine; True if processes are not listed."""
     processes = Path("/proc")
     if not processes.exists():
         return True
@@ -65,11 +62,7 @@ def runs_here(port: int) -> bool:
 
 
 def comes_here(host: str, port: int) -> bool:
-    """Return whether a node runs on this machine; wait for that of a head which has just started.
-
-    A second node there would keep the head from being restarted after a loss: Ray finds the
-    cluster running.
-    """
+    """Return whether a node runs on this machine; wait for one whose head has just started."""
     until = time.monotonic() + (_LATE_SECONDS if _is_here(host) else 0.0)
     while not runs_here(port):
         if time.monotonic() >= until:

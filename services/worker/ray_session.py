@@ -74,25 +74,16 @@ class RaySession:
     node: JoinedNode | None = None
 
     def head_answers(self) -> bool:
-        """Return whether the control service accepts connections.
-
-        Ray itself waits for it for a minute, and then ends the process.
-        """
+        """Return whether the control service accepts connections."""
         return listens(*self.head)
 
     def raylet_runs(self) -> bool:
-        """Return whether this process's own raylet runs; Ray ends the process some 16 s after it.
-
-        True for a raylet that others started.
-        """
+        """Return whether this process's own raylet runs; without it Ray ends the process."""
         started = self.ray._private.worker._global_node  # noqa: SLF001 - there is no other way
         return started is None or all(kind != "raylet" for kind, _ in started.dead_processes())
 
     def nodes(self) -> list[dict[str, Any]]:
-        """Return the nodes that are alive, as `ray.nodes`, which would wait for a lost head.
-
-        Raises EvaluatorUnavailable if the head does not answer within two seconds.
-        """
+        """Return the nodes that are alive, as `ray.nodes`, which would wait for a lost head."""
         client = self.ray._private.worker.global_worker.gcs_client  # noqa: SLF001 - with a time-out
         try:
             nodes = client.get_all_node_info(timeout=_ANSWER_SECONDS)
@@ -269,10 +260,7 @@ def _environment(values: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _bare(ray: ModuleType) -> Iterator[None]:
-    """Start no dashboard, autoscaler or log monitor: they take as long to start as the workers.
-
-    `ray.init` has no options for it. A version with other names starts them.
-    """
+    """Start no dashboard, autoscaler or log monitor: they take as long to start as the workers."""
     node = ray._private.node.Node  # noqa: SLF001 - there is no other way
     unused = {name: vars(node)[name] for name in _UNUSED if name in vars(node)}
     for name in unused:

@@ -43,10 +43,7 @@ def run_task(
     expected: Provenance,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Answer:
-    """Simulate all designs in all cases, unless this process computes something else.
-
-    should_stop: whether the answer is not needed any more; a long case may then raise.
-    """
+    """Simulate all designs in all cases, unless this process computes something else."""
     begun = time.perf_counter()
     for robots, precision in {(case.robots, case.precision) for case in cases}:
         libraries = tuple(expected.libraries)
@@ -79,10 +76,7 @@ class Failure:
 def run_in_worker(
     place: tuple[Any], cases: tuple[int, ...], designs: NDArray[np.float64]
 ) -> Answer | Failure:
-    """Run a task in a process of Ray. Errors of the simulation are returned, not raised.
-
-    place: reference to the `Shared` object, in a tuple: Ray would read a bare one for every task.
-    """
+    """Run a task in a process of Ray. Errors of the simulation are returned, not raised."""
     # Raises if the object is lost: that is Ray's fault and no result.
     shared = _shared(place[0])
     try:

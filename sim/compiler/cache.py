@@ -70,11 +70,7 @@ def is_intact(library: Path) -> bool:
 def build(
     stem: str, file: str, make: Callable[[Path], None], directory: Path | None = None
 ) -> Path:
-    """Store a library in the cache, unless another process has done so meanwhile.
-
-    Processes that need the same library wait for the one that builds it. At any time, even after a
-    power failure, a file under the library's name is complete or does not match its checksum.
-    """
+    """Store a library in the cache, unless another process has done so meanwhile."""
     size = _size_limit()
     place = directory or _writable_directory()
     library = place / file
@@ -230,11 +226,7 @@ def _size_limit() -> int:
 
 
 def _sweep(directory: Path, size: int) -> None:
-    """Remove leftovers of dead processes, and libraries that have not been used for long.
-
-    Loaded libraries stay in memory when their file is removed; a process that has only found one
-    rebuilds it.
-    """
+    """Remove leftovers of dead processes, and libraries that have not been used for long."""
     oldest = time.time() - KEPT_UNUSED_DAYS * _DAY
     with contextlib.suppress(OSError):
         for path in sorted(directory.iterdir()):

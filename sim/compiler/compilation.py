@@ -320,10 +320,7 @@ def build_library(
     time_limit: float = TIME_LIMIT,
     directory: Path | None = None,
 ) -> Path | None:
-    """Find a library in the cache or among the prebuilt ones, or compile it; without loading it.
-
-    If $CC is set, no prebuilt library is used.
-    """
+    """Find a library in the cache or among the prebuilt ones, or compile it; without loading it."""
     aim = (compile_for or target()).resolved()
     hashed = hashlib.sha256(
         repr((FLAGS, SCHEDULING, *extra_flags, aim, platform.system())).encode()

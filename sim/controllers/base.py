@@ -182,10 +182,7 @@ class Controller(Protocol):
 
     @property
     def published(self) -> Mapping[str, Mapping[str, float]]:
-        """Designs from the literature, by the preference or study that they belong to.
-
-        A design tuned together with a gait includes the gait's variables.
-        """
+        """Designs from the literature, by the preference or study that they belong to."""
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """Compile a design to the integers that run on the robot.

@@ -101,11 +101,7 @@ class MembershipSets:
 
     @property
     def output(self) -> dict[str, FuzzySet]:
-        """Sets of the output.
-
-        All have the same width, the distance from null to positive, so that null and positive each
-        end where the other peaks, as in Matlab.
-        """
+        """Sets of the output."""
         peaks = {"null": 0.0, "positive": self.positive_peak, "negative": -self.positive_peak}
         if self.extreme_peak is not None:
             peaks["positive-extreme"] = self.extreme_peak

@@ -115,11 +115,7 @@ def timing_tables() -> Iterator[TableTime]:
 
 
 def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
-    """Tabulate an inference on the axes' grid.
-
-    The resolution follows the largest output in the table, neither clipped to the output's range
-    nor wasted on parts of the universe that the centroid never reaches.
-    """
+    """Tabulate an inference on the axes' grid."""
     begun = time.perf_counter()
     grid = {name: axis.grid() for name, axis in axes.items()}
     values, largest = compiled_table(system, grid) or reference_table(system, grid)
@@ -147,11 +143,7 @@ def reference_table(
 def compiled_table(
     system: Mamdani, grid: Mapping[str, NDArray[np.float64]], *, library: ctypes.CDLL | None = None
 ) -> tuple[NDArray[np.int8], float] | None:
-    """`reference_table` in a fraction of a millisecond, with the same bits.
-
-    None without a C compiler, for a system that is too large, and for a grid that does not consist
-    of whole blocks.
-    """
+    """`reference_table` in a fraction of a millisecond, with the same bits."""
     *firsts, inner = system.degrees(grid)
     memberships, points = system.output_memberships(), system.output_points()
     library = library or _library()

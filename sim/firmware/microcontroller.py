@@ -103,10 +103,7 @@ def as_table(response: Response | None) -> LookupTable | None:
 def in_16_bits(
     codes: NDArray[np.int64], kind: type[Narrow], what: str, joints: Sequence[str]
 ) -> NDArray[Narrow]:
-    """Check and convert codes (T, J) [counts] to the robot's 16 bits.
-
-    These hold angles of half a turn in either direction, and absolute currents.
-    """
+    """Check and convert codes (T, J) [counts] to the robot's 16 bits."""
     limits = np.iinfo(kind)
     beyond = (codes < limits.min) | (codes > limits.max)
     if beyond.any():

@@ -14,10 +14,7 @@ Floats = NDArray[np.float64]
 def quadratic_spline(
     phase: Floats, *, stride: float, height: float, duty_factor: float
 ) -> tuple[Floats, Floats]:
-    """Foot position, see `half_ellipse`.
-
-    The spline's middle point lies at twice the height, so that the foot reaches the height.
-    """
+    """Foot position, see `half_ellipse`."""
     supporting = phase < duty_factor
     support = phase / duty_factor
     a = np.clip((phase - duty_factor) / (1.0 - duty_factor), 0.0, 1.0)

@@ -67,10 +67,7 @@ def static_stability(robot: Robot, scenario: Scenario) -> Stability:
 
 
 def support_margin(feet: Floats, point: Floats) -> float:
-    """Distance of a point (2,) from the edge of the convex hull of feet (n, 2) [m].
-
-    Positive inside the hull; negative outside, or if the feet are collinear.
-    """
+    """Distance of a point (2,) from the edge of the convex hull of feet (n, 2) [m]."""
     hull = _convex_hull([(x, y) for x, y in feet.tolist()])
     x, y = point.tolist()
     distances, inside = [], len(hull) > 2

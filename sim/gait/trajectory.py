@@ -33,13 +33,7 @@ fir1: a windowed sinc."""
 
 
 def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
-    """Coefficients of the filter at the control rate, (n,), oldest angle first; the sum is 1.
-
-    `moving_average` has equal coefficients, one per control period. `hamming` is fir1(order,
-    cut-off) with the number of control periods as order, so that the delay is half of the length.
-    The cut-off is one over the number of coefficients times the control period: the main lobe of
-    the ideal low-pass then just fills the filter.
-    """
+    """Coefficients of the filter at the control rate, (n,), oldest angle first; the sum is 1."""
     order = round(fir_ms * 1e-3 / CONTROL_PERIOD)
     taps = max(1, order) if window == "moving_average" else order + 1
     # One or two symmetric coefficients are equal, and have no cut-off below Nyquist's.
@@ -289,11 +283,7 @@ def _unfiltered(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, fl
 
 
 def require_reachable(robot: Robot, scenario: Scenario) -> None:
-    """Check that the legs reach the planned feet; takes no longer for a long walk.
-
-    Of a walk of more than 20 s only the beginning is checked, which has all of the foot's path;
-    later cycles may sample it a fraction of a control tick earlier or later.
-    """
+    """Check that the legs reach the planned feet; takes no longer for a long walk."""
     _check_reach(robot, scenario)
 
 

@@ -25,11 +25,7 @@ class LanePlan:
 
 
 def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
-    """Distribute walks over lanes so that all lanes finish at nearly the same time.
-
-    Longest processing time first (Graham's LPT rule); then walks of the lane that finishes last are
-    moved or exchanged while that shortens it.
-    """
+    """Distribute walks over lanes so that all lanes finish at nearly the same time."""
     if not durations:
         return LanePlan((), 0.0, 1.0)
     filled = _longest_first(durations, lanes)
@@ -45,10 +41,7 @@ def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
 
 
 def _end(durations: Sequence[float], order: Sequence[int], lanes: int) -> float:
-    """Return when the last lane finishes if each free lane takes the next walk of the order.
-
-    It may be earlier than planned: a lane without planned walks takes the next one here.
-    """
+    """Return when the last lane finishes if each free lane takes the next walk of the order."""
     free = [0.0] * lanes
     for index in order:
         heapq.heapreplace(free, free[0] + durations[index])

@@ -84,10 +84,7 @@ def philox(counter: Words, key: tuple[Words, Words]) -> Words:
 
 
 def byte_sums(seeds: Words, tick: int, joints: int, stream: int = 0) -> Integers:
-    """Return nearly normal integers (n, J, 2), two for every joint, from 64-bit seeds (n,).
-
-    They are sums of eight bytes minus their mean; the standard deviation is `DEVIATION`.
-    """
+    """Return nearly normal integers (n, J, 2), two for every joint, from 64-bit seeds (n,)."""
     counter = np.zeros((len(seeds), joints, 4), dtype=np.uint64)
     counter[..., 0], counter[..., 1], counter[..., 2] = tick, np.arange(joints), stream
     column = seeds[:, np.newaxis]
@@ -105,10 +102,7 @@ class Sensors:
         self._tick = 0
 
     def read(self, angle: Floats, current: Floats) -> tuple[Floats, Floats]:
-        """Return the next tick's readings of angles (J,) [rad] and absolute currents (J,) [A].
-
-        Readings from before the walk equal the first one.
-        """
+        """Return the next tick's readings of angles (J,) [rad] and absolute currents (J,) [A]."""
         noise = self._noise(len(angle))
         self._tick += 1
         seen = []

@@ -188,12 +188,7 @@ class MeasuredLog:
 
 
 def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
-    """A simulated walk as logged by the robot's instruments, without their errors.
-
-    Encoders see the motors' angles, potentiometers, here on every joint, those of the links;
-    currents are those of `sensed_currents`; the boards of all legs see the one battery, whose
-    current follows from the motors' power, which the bridges conserve.
-    """
+    """A simulated walk as logged by the robot's instruments, without their errors."""
     if not np.isfinite(walk.current).all():
         raise SimulationInputError("a walk that ended early cannot be compared")
     joints, legs = robot.joint_names, tuple(leg.name for leg in robot.legs)
@@ -297,12 +292,7 @@ def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float
 
 
 def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, float]:
-    """Return the lag k [rows] with measured[t + k] = simulated[t], and the correlation there.
-
-    Desired angles are (T1, J) and (T2, J). The cross-correlation over the overlap identifies the
-    cycle, but it favours long overlaps and is off by some rows. Within a quarter of a cycle, the
-    mean square difference determines the exact row.
-    """
+    """Return the lag k [rows] with measured[t + k] = simulated[t], and the correlation there."""
     mean = simulated.mean(axis=0)
     x, y = measured - mean, simulated - mean
     if not (np.ptp(x, axis=0).any() and np.ptp(y, axis=0).any()):

@@ -195,10 +195,7 @@ class LooseGears:
         self.angles = self.angles + time * self.rates
 
     def _shaft_torques(self, ahead: Floats, faster: Floats) -> Floats:
-        """Torques on the links [N m] of rotors that are ahead [rad] and faster [rad/s] (J,).
-
-        Zero inside the play; beyond it a spring and damper that never pulls back.
-        """
+        """Torques on the links [N m] of rotors that are ahead [rad] and faster [rad/s] (J,)."""
         beyond = ahead - np.clip(ahead, -self._half, self._half)
         side = np.sign(beyond)
         push = self._stiffness * np.abs(beyond) + self._damping * side * faster

@@ -78,11 +78,7 @@ def with_contacts(robot: Robot, surroundings: Surroundings, rig: Rig, feet: Feet
 def even_drags(
     robot: Robot, surroundings: Surroundings, standing: float | None = None
 ) -> tuple[float, ...]:
-    """Drags, by leg [N s/m], with which friction is full at the same slip as in the robot's law.
-
-    A law's drag follows the normal force; MuJoCo's is constant. The weight is carried evenly by
-    `standing` feet, by default half of them.
-    """
+    """Drags, by leg [N s/m], with which friction is full at the same slip as in the robot's law."""
     mass = robot.urdf.total_mass - robot.urdf.body.mass + surroundings.body.mass
     share = -float(surroundings.gravity[2]) * mass / (standing or 0.5 * len(robot.legs))
     zoned = robot.description.contact_law in {"linear_zone", "dead_zone"}

@@ -73,11 +73,7 @@ class SoleNumbers:
 def propose_drives(
     urdf: Urdf, names: Sequence[Sequence[str]], legs: Sequence[ChainLeg], stance: Stance
 ) -> list[list[DriveNumbers]]:
-    """Propose a drive for every joint, by leg.
-
-    Torque and speed are the URDF's limits (`effort`, `velocity`) if they are plausible: many files
-    say 1000 N m for "unknown". Else they are multiples of what standing on half the legs takes.
-    """
+    """Propose a drive for every joint, by leg."""
     joints = {joint.name: joint for joint in urdf.joints}
     force = urdf.total_mass * GRAVITY / (len(legs) / 2.0)
     needs = []

@@ -118,11 +118,7 @@ def check_upright(urdf: Urdf, hips: Floats, feet: Floats) -> None:
 
 
 def sideways(legs: Sequence[ChainLeg], stance: Sequence[Sequence[float]]) -> bool:
-    """Infer that a robot faces y, from feet ahead of and behind their hips in the stance [rad].
-
-    Hanging legs swing ahead, about their knees' axes; legs with vertical hip axes stand at the
-    body's sides. Legs all around indicate nothing.
-    """
+    """Infer that a robot faces y, from feet ahead of and behind their hips in the stance [rad]."""
     sideways, ahead = 0.0, 0.0
     for leg, angles in zip(legs, stance, strict=True):
         if leg.is_upright:

@@ -158,10 +158,7 @@ _BY_HAND: Final = "or write robot.toml by hand, as docs/robots.md explains, if i
 
 
 def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:
-    """Reject a chain of joints that looks like a leg, but is not recognized as one.
-
-    A robot with one rigid leg falls, and only mistakes in a URDF lead to that.
-    """
+    """Reject a chain of joints that looks like a leg, but is not recognized as one."""
     paths = {name: _path(urdf, name) for name in urdf.links}
     of_legs = [paths[link] for link in legs]
     distances = [_distances(path) for path in of_legs]

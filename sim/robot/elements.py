@@ -207,11 +207,7 @@ def joint_of(element: ET.Element) -> Joint:
 
 
 def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
-    """Fix held joints, at angles by name [rad], and a free base; make continuous joints revolute.
-
-    A robot's body moves freely anyway: a floating joint from a massless first link such as `world`
-    adds nothing.
-    """
+    """Fix held joints at angles by name [rad], and a free base; make continuous joints revolute."""
     changed = _free_base(root)
     missing = set(held)
     for element in root.findall("joint"):

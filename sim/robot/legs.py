@@ -113,10 +113,7 @@ class ChainLeg:
         return np.asarray(self._moved(angles, slopes=False)[0])
 
     def feet(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Return the foot in the body's frame (T, 3) [m] and its derivatives (T, 3, 3) [m].
-
-        The last index of the derivatives is the joint.
-        """
+        """Return the foot in the body's frame (T, 3) [m] and its derivatives (T, 3, 3) [m]."""
         moved = self._moved(angles, slopes=True)
         return moved[0], np.stack(tuple(moved[:0:-1]), axis=-1)
 

@@ -107,12 +107,7 @@ class VisibleLink:
 
 
 def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
-    """Return every link with its shapes, parents before their children, the body first.
-
-    A link has its visual or else its collision geometry. Without either (or with meshes only), legs
-    are capsules from joint to joint with spheres as soles, and the body is a box that spans the
-    hips. A load [kg] on the body is a cube.
-    """
+    """Return every link with its shapes, parents before their children, the body first."""
     carriers = {joint.child: joint.parent for joint in robot.urdf.joints}
     derived = _derived(robot)
     colours = material_colours(robot.urdf.text)
@@ -279,10 +274,7 @@ def _numbers(text: str, count: int, largest: float) -> list[float] | None:
 
 
 def mesh_bounds(path: Path) -> Floats | None:
-    """Return least and largest coordinates of a mesh's vertices (2, 3), in the file's units.
-
-    None if the file is not a mesh.
-    """
+    """Return least and largest coordinates of a mesh's vertices (2, 3), in the file's units."""
     # Slow to import, and seldom needed.
     import coal  # noqa: PLC0415
 

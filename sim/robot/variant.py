@@ -77,11 +77,7 @@ SHIPPED: Final[tuple[RobotName, ...]] = get_args(RobotName)
 
 @lru_cache(maxsize=8)
 def shipped_robot(name: str) -> Robot:
-    """Load a robot that ships with gaitswarm.
-
-    Its folder contains robot.toml and robot.urdf, or parameters.toml with another shipped robot as
-    base and values of some of its `identifiable_variables`.
-    """
+    """Load a robot that ships with gaitswarm."""
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
     folder = resources.files("gaitswarm.sim.robot") / name

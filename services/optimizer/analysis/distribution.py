@@ -103,10 +103,7 @@ def iteration_starts(columns: EvaluationColumns) -> NDArray[np.intp]:
 
 
 def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
-    """Return (I, q) quantiles of each row's finite values (I, n), linearly interpolated.
-
-    NaN for a row without a finite value.
-    """
+    """Return (I, q) quantiles of each row's finite values (I, n), linearly interpolated."""
     ordered = np.sort(values, axis=1)
     last = np.isfinite(ordered).sum(axis=1) - 1
     place = np.maximum(last, 0)[:, np.newaxis] * np.array(quantiles)
@@ -121,11 +118,7 @@ def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
 
 
 def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
-    """Return at most `most` rows for a plot: whole iterations, evenly chosen, ascending.
-
-    The row of least fitness is always included. If one iteration exceeds the limit, its rows are
-    thinned as well.
-    """
+    """Return at most `most` rows for a plot: whole iterations, evenly chosen, ascending."""
     rows = len(columns)
     if rows <= most:
         return np.arange(rows)

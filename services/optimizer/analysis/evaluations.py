@@ -129,10 +129,7 @@ def case_results(
     values: NDArray[np.float64],
     log_utilities: NDArray[np.float64],
 ) -> dict[str, dict[str, Any]]:
-    """Return the fields of the `ScenarioResultView` of one design in each of K cases.
-
-    columns: names of the objectives, and of the measurements.
-    """
+    """Return the fields of the `ScenarioResultView` of one design in each of K cases."""
     objectives, measurements = columns
     count = len(objectives)
     # Few designs lack a number; checking each would dominate.

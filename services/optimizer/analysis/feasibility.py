@@ -85,10 +85,7 @@ def limit_views(spec: JobSpec, results: NDArray[np.float64]) -> list[LimitView]:
 
 
 def closest(spec: Spec, evaluations: Sequence[Evaluation], *, ended: bool) -> ClosestView | None:
-    """Return the design of least violation among those of an iteration; None if all failed.
-
-    ended: whether the job has ended.
-    """
+    """Return the design of least violation among those of an iteration; None if all failed."""
     if not isinstance(spec, JobSpec) or not spec.constraints or not evaluations:
         return None
     results = np.stack([evaluation.objectives for evaluation in evaluations])

@@ -39,11 +39,7 @@ _BLOCK: Final = 1024
 
 
 def non_dominated(points: Floats) -> NDArray[np.bool_]:
-    """Return the (r,) mask of the points (r, M) that no other dominates; minimized.
-
-    A point dominates another if it is no worse in any objective and better in one; equal points do
-    not dominate each other. Points that are not finite are never on the front.
-    """
+    """Return the (r,) mask of the points (r, M) that no other dominates; minimized."""
     finite = np.isfinite(points).all(axis=1)
     # Sorted lexicographically: no point is dominated by a later one.
     distinct, inverse = np.unique(points[finite], axis=0, return_inverse=True)
@@ -82,11 +78,7 @@ _AT_ONCE: Final = 4_000_000
 
 
 def hypervolume_curve(points: Floats) -> tuple[Floats, float]:
-    """Estimate the (n,) hypervolumes after each of (n, M) points, minimized, in their order.
-
-    With the standard error of the last one. The box is the unit box with the reference point at 1;
-    values below 0 count as 0.
-    """
+    """Estimate the (n,) hypervolumes after each of (n, M) points, minimized, in their order."""
     size = points.shape[1]
     samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
     left = RandomNumbers(0, _DRAW).uniform(samples, size)
@@ -267,12 +259,7 @@ class FrontView(View):
 def pareto_front(
     columns: EvaluationColumns, vectors: Floats, spec: JobSpec, *, most: int, infeasible: int = 0
 ) -> FrontView:
-    """Find the front of (r, M) objective vectors, at least one row finite.
-
-    infeasible: number of designs that violate a constraint; their vectors are +inf, as of failures.
-
-    Normalised objectives are logarithms, 0 at the ideal and 1 at the nadir.
-    """
+    """Find the front of (r, M) objective vectors, at least one row finite."""
     records = _best_at_their_time(vectors)
     rows = records[non_dominated(vectors[records])]
     logarithms, low, span = _logarithms(vectors, rows)
@@ -395,10 +382,7 @@ def _best_at_their_time(vectors: Floats) -> Rows:
 
 
 def _logarithms(vectors: Floats, rows: Rows) -> tuple[Floats, Floats, Floats]:
-    """(r, M) logarithms; (M,) the front's minimum; (M,) its range, 1 if there is none.
-
-    An objective of 0, which has no logarithm, counts as the least positive one.
-    """
+    """(r, M) logarithms; (M,) the front's minimum; (M,) its range, 1 if there is none."""
     positive = np.where(vectors > 0.0, vectors, np.inf)
     least = np.where(np.isfinite(positive.min(axis=0)), positive.min(axis=0), 1.0)
     logarithms = np.log(np.maximum(vectors, least))

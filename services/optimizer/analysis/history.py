@@ -68,10 +68,7 @@ class HistoryCache:
         self.nbytes = 0  # in use
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Return the evaluations of a job's committed iterations, read-only.
-
-        Raises Conflict if they can never fit, and EvaluatorUnavailable if others use the memory.
-        """
+        """Return the evaluations of a job's committed iterations, read-only."""
         with self._reading:
             history = self._histories.pop(job.id, None) or _empty_columns(job)
             first = int(history.iteration[-1]) + 1 if len(history) else 0

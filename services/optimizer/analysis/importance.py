@@ -184,10 +184,7 @@ def _variables(
 def first_order_indices(
     designs: Floats, variables: Sequence[Variable], output: Floats
 ) -> list[IndexIntervalView] | None:
-    """Estimate every variable's first-order Sobol' index for an output (r,), by its order alone.
-
-    None for too few designs or a constant output.
-    """
+    """Estimate every variable's first-order Sobol' index for an output (r,), by its order alone."""
     if len(output) < LEAST_DESIGNS:
         return None
     rank = average_ranks(output)

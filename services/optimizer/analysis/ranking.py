@@ -86,10 +86,7 @@ class RankingView(View):
 
 
 def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
-    """Rank all designs by their stored results.
-
-    spec: the job's, with the requested preference and constraints.
-    """
+    """Rank all designs by their stored results."""
     preference, before = spec.resolved_preference(), columns.fitness
     fitness = fitness_by(columns, preference, aggregation=spec.aggregation)
     walked = np.isfinite(fitness)

@@ -81,11 +81,7 @@ def target_results(
     *,
     bests: Sequence[Evaluation] | None = None,
 ) -> TargetsView:
-    """Compare the best design of all runs with the targets; bests: those in double precision.
-
-    Left-out targets are predicted from stored objectives: the design that is best without them
-    gives the prediction. Nothing is simulated.
-    """
+    """Compare the best design of all runs with the targets; bests: those in double precision."""
     simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
     differences = spec.differences(simulated)
     run, best = _best_of_all(runs) if bests is None else _best_in_double(bests)

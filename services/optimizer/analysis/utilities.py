@@ -71,10 +71,7 @@ def infeasible_rows(columns: EvaluationColumns, spec: JobSpec) -> NDArray[np.boo
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
-    """Return (r, K) logarithms of the bias-weighted product (eq. 3.8, 4.1).
-
-    +inf if the simulation failed or lacks a weighted objective.
-    """
+    """Return (r, K) logarithms of the bias-weighted product (eq. 3.8, 4.1)."""
     result = np.empty(columns.statuses.shape)
     weighted = [
         (m, b, e)
@@ -120,12 +117,7 @@ def objective_vectors(
     *,
     aggregation: Aggregation | None = None,
 ) -> Floats:
-    """Return each design's (r, M) objectives over all scenarios, minimized.
-
-    Objective m is the fitness under a preference that weighs it alone. For a mean over scenarios
-    without worlds, fitness under any preference with these biases is the product of the objectives,
-    each raised to its exponent. A row is +inf if a simulation failed or lacks an objective.
-    """
+    """Return each design's (r, M) objectives over all scenarios, minimized."""
     result = np.empty((len(columns), len(bias)))
     for m, exponent in enumerate(np.eye(len(bias)).tolist()):
         alone = Preference(bias=tuple(bias), exponent=tuple(exponent))

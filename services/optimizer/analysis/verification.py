@@ -292,10 +292,7 @@ _MOST: Final = 20
 
 
 def check_histories(store: Store) -> list[str]:
-    """Verify the chain of every job from its rows, one job after the other.
-
-    Jobs may run meanwhile: later commits are ignored.
-    """
+    """Verify the chain of every job from its rows, one job after the other."""
     return list(islice(_broken(store), _MOST))
 
 

@@ -41,10 +41,7 @@ class DesignSpace:
         chosen: Sequence[str | Variable] | None,
         fixed: Mapping[str, float | str],
     ) -> DesignSpace:
-        """Combine a catalogue with a user's choice. Raises ValueError.
-
-        default: what is searched, unless fixed, if nothing was chosen; the required variables.
-        """
+        """Combine a catalogue with a user's choice. Raises ValueError."""
         catalogue = VariableCatalogue((*required, *optional))
         fixed_values = _fixed_values(fixed, catalogue)
         if chosen is None:

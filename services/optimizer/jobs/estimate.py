@@ -55,10 +55,7 @@ def recent_pace(before: float | None, latest: float) -> float:
 
 
 def time_left(job: Job, now: datetime) -> TimeLeft:
-    """Estimate a job's end from its committed iterations.
-
-    Rates refer to the time spent evaluating; pauses and time in the queue do not count.
-    """
+    """Estimate a job's end from its committed iterations."""
     progress = job.progress
     rated = job.own_evaluations > 0 and progress.compute_seconds > 0.0
     eta: float | None = None
@@ -180,10 +177,7 @@ class MeasuredRates:
     def rate(
         self, spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]
     ) -> tuple[float | None, str]:
-        """Return the cached or measured rate, and its basis.
-
-        Compiles the robot's kernel if needed, as the job itself would.
-        """
+        """Return the cached or measured rate, and its basis."""
         if any(isinstance(case, LongCase) for case in cases):
             return None, "none: a simulation takes too long to be measured in advance"
         if prepare(spec.robot, precision=spec.precision) != "native":

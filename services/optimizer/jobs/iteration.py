@@ -202,10 +202,7 @@ def fitness_summary(
     best_before: float | None,
     violations: Floats | None = None,
 ) -> dict[str, Any]:
-    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none.
-
-    violations: of `Spec.violations`.
-    """
+    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none."""
     finite = fitness[np.isfinite(fitness)]
     summary: dict[str, Any] = dict.fromkeys(SUMMARY)
     summary["infeasible"] = 0

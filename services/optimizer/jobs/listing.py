@@ -94,10 +94,7 @@ def to_cursor(order: str, value: Any, item_id: str) -> str:
 
 
 def from_cursor(order: str, text: str, kind: type) -> tuple[Any, str]:
-    """Return value and id of an item, the inverse of `to_cursor`. Raises InvalidRequest.
-
-    kind: of the value: datetime, float or str; it may also be None.
-    """
+    """Return value and id of an item, the inverse of `to_cursor`. Raises InvalidRequest."""
     match = re.fullmatch(rf"{re.escape(order)}:(.*):([0-9a-z]{{12,32}})", text)
     with suppress(ValueError, OverflowError, RecursionError):
         if match is not None:

@@ -138,10 +138,7 @@ _NUMERATOR: Final = 1e5
 
 
 def figure_of_merit(fitness: float, preference: Preference) -> float | None:
-    """F of eq. 3.1, which chapter 3 maximizes: 1e5 V^2 / (E F_GEAR F_ACC F_ANGACC (|Z| + 0.03)).
-
-    Over several scenarios it is the geometric mean. None for other preferences.
-    """
+    """F of eq. 3.1, which chapter 3 maximizes: 1e5 V^2 / (E F_GEAR F_ACC F_ANGACC (|Z| + 0.03))."""
     if preference != PREFERENCES["chapter-3"] or not 0.0 < fitness < math.inf:
         return None
     value = _NUMERATOR / fitness

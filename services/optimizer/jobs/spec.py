@@ -247,19 +247,10 @@ class Spec(BaseModel):
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
-        """Return searched and fixed variables, checked against the catalogue.
-
-        Raises:
-            ValueError: Invalid choice; names the variable. Never for a validated spec.
-        """
+        """Return searched and fixed variables, checked against the catalogue."""
 
     def check_can_be_simulated(self) -> None:
-        """Check what only the simulator can decide: whether designs can be simulated.
-
-        Raises:
-            InvalidRequest: Bounds, values or a precision that cannot be simulated here; names the
-            field.
-        """
+        """Check what only the simulator can decide: whether designs can be simulated."""
         method = METHODS[self.search.name]
         if method.missing:
             raise InvalidRequest(
@@ -316,11 +307,7 @@ class Spec(BaseModel):
 
     @abstractmethod
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:
-        """Return the K cases, in the order of `case_names`.
-
-        Args:
-            recordings: Those named by `recording_ids`, by id.
-        """
+        """Return the K cases, in the order of `case_names`."""
 
     @property
     def search_libraries(self) -> dict[str, str]:

@@ -68,11 +68,7 @@ def run_embedded(  # noqa: C901 - one loop
     cache: bool = False,
     followed_iterations: int | None = None,
 ) -> Job:
-    """Run one job until it ends or is paused; return immediately if it has.
-
-    While another process holds the job, follow it. Once that process releases the job or its lease
-    expires, continue the job here.
-    """
+    """Run one job until it ends or is paused; return immediately if it has."""
     claim = None if isinstance(job, str) else job
     latest = store.job(job) if isinstance(job, str) else job.job
     job_id = latest.id

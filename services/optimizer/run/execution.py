@@ -185,10 +185,7 @@ def run_claim(
     stop: threading.Event | None = None,
     drain: threading.Event | None = None,
 ) -> Job:
-    """Run a claimed job until it ends, pauses or the lease is lost.
-
-    Unreachable workers or an unavailable store are waited for as long as the lease holds.
-    """
+    """Run a claimed job until it ends, pauses or the lease is lost."""
     run = _Run(claim, context, stop or threading.Event(), drain or threading.Event())
     try:
         with log_context(job=claim.job.id), run.heartbeat:
@@ -368,11 +365,7 @@ class _Run:
         *,
         give_up: Callable[[], bool] = lambda: False,
     ) -> T:
-        """Retry as long as the machine or its services are at fault.
-
-        Raises EvaluationStopped if the process is to end, the lease is lost or `give_up` is true
-        meanwhile, and StoreReplaced, which retries cannot resolve.
-        """
+        """Retry as long as the machine or its services are at fault."""
         failures = 0
         while True:
             try:
@@ -403,10 +396,7 @@ class _Run:
             _log.info("job %s continues after %.0f s", self.claim.job.id, seconds)
 
     def _ticks(self, seconds: float) -> Iterator[None]:
-        """Yield at intervals until the time has passed [s].
-
-        Raises EvaluationStopped when the run is to stop.
-        """
+        """Yield at intervals until the time has passed [s]."""
         until = self.context.clock() + seconds
         while (left := until - self.context.clock()) > 0.0:
             if self._should_stop():

@@ -36,11 +36,7 @@ def evaluate_uncached(
     keys: Sequence[bytes],
     should_stop: Callable[[], bool],
 ) -> tuple[tuple[Outcome, ...], tuple[bytes | None, ...]]:
-    """Evaluate a request without its cached and duplicate designs.
-
-    The outcomes equal those of a full evaluation, bit for bit, because an outcome depends on design
-    and case alone. An unavailable store has nothing cached.
-    """
+    """Evaluate a request without its cached and duplicate designs."""
     if store is None or not keys:
         return journal.evaluate(request, keys, should_stop), tuple(keys)
     first = {key: index for index, key in reversed(list(enumerate(keys)))}
@@ -109,10 +105,7 @@ class Journal:
         should_stop: Callable[[], bool],
         cached: Mapping[bytes, Outcome] = MappingProxyType({}),
     ) -> tuple[Outcome, ...]:
-        """Evaluate as `Evaluator.evaluate`; designs are identified by their keys.
-
-        cached: outcomes of designs, a row for each case.
-        """
+        """Evaluate as `Evaluator.evaluate`; designs are identified by their keys."""
         if not keys:
             return self._evaluator.evaluate(request, should_stop)
         if self._begun is None:

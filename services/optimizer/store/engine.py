@@ -114,11 +114,7 @@ class Database:
     """
 
     def __init__(self, url: str | sa.URL, *, for_migration: bool = False) -> None:
-        """Prepare connections.
-
-        For a migration there is no pool, no limit on the time of statements, and on SQLite no
-        check of foreign keys, as batch migrations drop and rename tables that others refer to.
-        """
+        """Prepare connections."""
         self.url = parse_url(url) if isinstance(url, str) else url
         self.observers: list[Observer] = []
         self._file: _OpenFile | None = None
@@ -141,11 +137,7 @@ class Database:
             self.engine = _postgresql_engine(self.url, options, unlimited=for_migration)
 
     def read(self, operation: str = "") -> AbstractContextManager[sa.Connection]:
-        """Open a transaction that reads.
-
-        On SQLite it never waits for a writer and sees one state of the database. On PostgreSQL
-        each statement is its own transaction, which saves round trips.
-        """
+        """Open a transaction that reads."""
         return self.transaction(operation, write=False)
 
     def write(self, operation: str = "") -> AbstractContextManager[sa.Connection]:
@@ -160,14 +152,7 @@ class Database:
         write: bool,
         before: Callable[[sa.Connection], None] | None = None,
     ) -> Iterator[sa.Connection]:
-        """Open a transaction.
-
-        Raises StoreUnavailable if the database is unreachable, or locked for `BUSY_SECONDS`, and
-        StoreReplaced, with writes rolled back, if its file was removed or replaced.
-
-        operation: name for observers; "" to hide the transaction from them. before: called with the
-        connection before the transaction begins.
-        """
+        """Open a transaction."""
         begun, failure = time.perf_counter(), None
         try:
             with self.translated_errors(), self.engine.connect() as connection:
@@ -193,10 +178,7 @@ class Database:
             self._file.check()
 
     def check_pages(self) -> None:
-        """Read an SQLite file again, for `CHECK_SECONDS` at most; a server checks its own.
-
-        Open connections may hold pages that the file has lost. Raises StoreUnavailable.
-        """
+        """Read an SQLite file again, for `CHECK_SECONDS` at most; a server checks its own."""
         self.check_in_place()
         if self.path is None:
             return
@@ -375,11 +357,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def _postgresql_engine(url: sa.URL, options: dict[str, Any], *, unlimited: bool) -> sa.Engine:
-    """Create an engine on psycopg whose connections end within `SILENCE_SECONDS` of a partition.
-
-    Both ends probe a silent connection: the client detects a lost server, and the server ends the
-    transaction of a lost client, with its locks. Parameters in the URL take precedence.
-    """
+    """Create an engine on psycopg whose connections end within `SILENCE_SECONDS` of a partition."""
     probe = SILENCE_SECONDS // (_PROBES + 1)
     probes = {"keepalives_idle": probe, "keepalives_interval": probe, "keepalives_count": _PROBES}
     connect_args: dict[str, Any] = {

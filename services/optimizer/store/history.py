@@ -419,10 +419,7 @@ def _journal_entry(row: Row) -> JournalEntry:
 def take_history(
     connection: Connection, job: Row, lineage: Lineage, taken: TakenHistory, now: datetime
 ) -> dict[str, Any]:
-    """Commit the parent's iterations to a fork, which then no longer depends on the parent.
-
-    Returns columns of the fork's row. Raises Conflict if the parent is gone.
-    """
+    """Commit the parent's iterations to a fork, which then no longer depends on the parent."""
     parent, end, spec = lineage.parent, lineage.from_iteration, to_job(job).spec
     provenance = provenance_document(taken.provenance)
     documents = ChainDocuments(parsed(job["spec"]), parsed(job["lineage"]), provenance)

@@ -204,11 +204,7 @@ class Leases(Aggregate):
     def _held(
         self, operation: str, claim: Claim, *, committed: int | None = None
     ) -> Iterator[tuple[Connection, Row]]:
-        """Open a transaction with the locked row of a claimed job. Raises LeaseLost.
-
-        committed: iteration whose commit may be repeated after it ended or paused the job, which
-        gives up the lease but not the token.
-        """
+        """Open a transaction with the locked row of a claimed job. Raises LeaseLost."""
         try:
             with self._database.write(operation) as connection:
                 row = _claimed_row(connection, claim, committed)

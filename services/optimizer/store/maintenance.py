@@ -40,11 +40,7 @@ _RECORDING_ID: Final = re.compile(r"\b[0-9a-f]{32}\b")
 
 
 def backup(url: str, file: Path, *, overwrite: bool = False) -> None:
-    """Write a snapshot of an SQLite database, which may be in use, to a file.
-
-    Raises InvalidRequest for a database on a server, Conflict for a file that exists and must not
-    be replaced, and StoreUnavailable.
-    """
+    """Write a snapshot of an SQLite database, which may be in use, to a file."""
     if file.exists() and not overwrite:
         raise Conflict(f"{file} exists already; name another file, or replace it with --force")
     parsed = parse_url(url)
@@ -56,12 +52,7 @@ def backup(url: str, file: Path, *, overwrite: bool = False) -> None:
 
 
 def restore(url: str, file: Path, *, overwrite: bool = False) -> None:
-    """Fill an unused database from a backup of this or an older version, in the newest schema.
-
-    Raises NotFound, InvalidRequest for a file that is no backup, Conflict if the database is in use
-    or holds data that must not be replaced, and StoreUnavailable if it cannot be written, or a
-    newer gaitswarm made the backup.
-    """
+    """Fill an unused database from a backup of this or an older version, in the newest schema."""
     if not file.is_file():
         raise NotFound(f"there is no backup {file}")
     parsed = parse_url(url)
@@ -163,11 +154,7 @@ def _copy_rows(source: Connection, target: Connection) -> None:
 
 
 def check(url: str) -> list[str]:
-    """Return damage of an SQLite file, which may be in use; at most 20 findings of each kind.
-
-    A server checks its own files. Raises StoreUnavailable if the database cannot be read or lacks
-    the newest schema.
-    """
+    """Return damage of an SQLite file, which may be in use; at most 20 findings of each kind."""
     findings: list[str] = []
     with closing(Database(url, for_migration=True)) as database:
         check_revision(database)
@@ -200,12 +187,7 @@ def prune(
     audit_older_than: timedelta | None = None,
     trusts_clock: bool = False,
 ) -> Pruned:
-    """Remove old jobs, as `Store.delete_ended_before`, old audit entries and unused recordings.
-
-    Free space is returned to the file system. An age of None removes none of its kind. Raises
-    Conflict if the clock has jumped, and is not trusted, so that ages may be wrong, and
-    StoreUnavailable if the database cannot be written or lacks the newest schema.
-    """
+    """Remove old jobs, as `Store.delete_ended_before`, old audit entries and unused recordings."""
     with closing(Database(url, for_migration=True)) as database:
         check_revision(database)
         store = Store(database)

@@ -82,11 +82,7 @@ def _require_known(revision: str, name: str) -> None:
 
 
 def create(url: sa.URL) -> None:
-    """Create the tables of an empty database, by one of several processes at once.
-
-    Raises StoreUnavailable for a database that cannot be opened or has an older schema, and for an
-    SQLite file of another program.
-    """
+    """Create the tables of an empty database, by one of several processes at once."""
     with closing(Database(url, for_migration=True)) as database:
         if database.path is not None:
             # Only this user can read it, and SQLite's log. SQLite says why it cannot be made.
@@ -114,11 +110,7 @@ def create(url: sa.URL) -> None:
 
 
 def upgrade(url: str) -> str | None:
-    """Migrate an unused database to the newest revision; return that before, None if empty.
-
-    Raises Conflict if it is in use, and StoreUnavailable if it cannot be opened or migrated, or a
-    newer gaitswarm made it.
-    """
+    """Migrate an unused database to the newest revision; return that before, None if empty."""
     parsed = parse_url(url)
     with closing(Database(parsed, for_migration=True)) as database:
         with database.read() as connection:
@@ -169,10 +161,7 @@ def _migrate(connection: sa.Connection, name: str) -> None:
 
 @contextmanager
 def exclusive(database: Database) -> Iterator[sa.Connection]:
-    """Open a write transaction in a database that no other process has open or can open.
-
-    Raises Conflict if it is in use: another process has it open, or a job has a live lease.
-    """
+    """Open a write transaction in a database that no other process has open or can open."""
 
     def lock_before(connection: sa.Connection) -> None:
         if database.path is not None:
@@ -199,10 +188,7 @@ def exclusive(database: Database) -> Iterator[sa.Connection]:
 
 
 def lock_file(cursor: Any, name: str) -> None:
-    """Lock an SQLite file by leaving its write-ahead log, which needs exclusive use.
-
-    The cursor's connection must be outside a transaction; the lock ends with it. Raises Conflict.
-    """
+    """Lock an SQLite file by leaving its write-ahead log, which needs exclusive use."""
     cursor.execute("PRAGMA busy_timeout = 1000")
     cursor.execute("PRAGMA locking_mode = EXCLUSIVE")
     try:
@@ -216,10 +202,7 @@ def _in_use(name: str) -> Conflict:
 
 
 def admit(database: Database) -> None:
-    """Require the newest revision of each new connection, and exclude migrations while it lasts.
-
-    So a process that was cut off from its server during an upgrade is refused afterwards.
-    """
+    """Require the newest revision of each new connection, and exclude migrations while it lasts."""
 
     @sa.event.listens_for(database.engine, "connect")
     def _admit(connection: Any, _record: object) -> None:

@@ -101,11 +101,7 @@ def drifted(q: Sequence[Scalar], v: Sequence[Scalar], time: Scalar) -> list[Scal
 
 
 def _turned(quaternion: Sequence[Scalar], turn: Vector) -> list[Scalar]:
-    """Quaternion times the exponential of a small rotation vector [rad], renormalised.
-
-    Series in the squared angle (4e-3 rad at 10 rad/s), exact to rounding; one Newton step towards
-    unit length instead of a square root.
-    """
+    """Quaternion times the exponential of a small rotation vector [rad], renormalised."""
     x, y, z, w = quaternion
     half = scale(0.5, turn)
     square = dot(half, half)

@@ -55,11 +55,7 @@ class Foot:
         return (1.0 - self.touching) * (self.penetration > self.rising * time)
 
     def sliding(self, drag: Scalar, timestep: Scalar) -> Scalar:
-        """Confidence that a foot with this friction per speed still slides after a step [1].
-
-        Friction that does not depend on the speed must not be taken as constant over a step that
-        may stop the foot: the step would reverse its motion.
-        """
+        """Confidence that a foot with this friction per speed still slides after a step [1]."""
         return ca.fmax(1.0 - drag * (timestep * self.mobility), 0.0)
 
     def resisting(self, sideways: Scalar, further: Scalar = 0.0) -> Matrix:

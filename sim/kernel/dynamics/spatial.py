@@ -295,11 +295,7 @@ class RigidBody:
 
 
 def angular_acceleration_tensor(velocity: Vector, acceleration: Vector) -> Matrix:
-    """[alpha]x + [omega]x^2 (Angeles, Fundamentals of Robotic Mechanical Systems).
-
-    Times the offset of one point of a body from another, it is the difference of their
-    accelerations.
-    """
+    """[alpha]x + [omega]x^2 (Angeles, Fundamentals of Robotic Mechanical Systems)."""
     x, y, z = velocity
     a, b, c = acceleration
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z

@@ -148,12 +148,7 @@ def emit_c(
     added: Container[str] = (),
     in_place: bool = False,
 ) -> str:
-    """C source of `static void <name>(const vec *i0, ..., vec *o0, ...)`.
-
-    Inputs and outputs must not overlap, unless `in_place`. The sine and cosine of one angle share
-    their range reduction, a divisor used more than once is inverted once, and a product used only
-    as a term of sums is rounded with each of them (fused multiply-add).
-    """
+    """C source of `static void <name>(const vec *i0, ..., vec *o0, ...)`."""
     return _Emitter(function, uniform, added, in_place=in_place).source(name)
 
 

@@ -380,19 +380,7 @@ class CertificateSpec(WalksSpec):
         worlds: int = 1000,
         seed: int = 1,
     ) -> Self:
-        """Build the certificate of a design that a job found.
-
-        Args:
-            spec: The job. The certificate takes its robot, controller and preference, and adds
-                held-out scenarios to its scenarios.
-            design: Value of every variable, by name.
-            name: Name of the certificate's job.
-            worlds: Number of worlds to draw.
-            seed: Seed of the worlds.
-
-        Returns:
-            The specification of the certificate.
-        """
+        """Build the certificate of a design that a job found."""
         numbers = design_numbers(spec.controller, design)
         return cls(
             kind="certificate",

@@ -53,11 +53,7 @@ class Reference:
 
 
 def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
-    """Return the design that a job's best is compared with.
-
-    Shipped robots have a published one, for most controllers; otherwise it is the start design, the
-    middle of the bounds. Plug-in cases have other measures.
-    """
+    """Return the design that a job's best is compared with."""
     if not isinstance(spec, JobSpec) or spec.case is not None:
         return None
     study = None if isinstance(spec.robot, RobotFiles) else published_study(spec)
@@ -81,11 +77,7 @@ def published_study(spec: JobSpec) -> str | None:
 
 
 def adapted_to_job(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
-    """Adapt a published design to a job.
-
-    Gait variables that the job does not search, and conventions that it holds fixed, are those of
-    the job.
-    """
+    """Adapt a published design to a job."""
     space = spec.design_space()
     searched = {variable.name for variable in space.variables}
     conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}

@@ -152,11 +152,7 @@ class Aggregation:
     worst: bool = False  # whether the worst scenario alone counts
 
     def judged(self, log_utilities: Floats) -> Judgement:
-        """Judge designs by the geometric mean of `aggregated` (eq. 4.2).
-
-        Args:
-            log_utilities: As for `aggregated`.
-        """
+        """Judge designs by the geometric mean of `aggregated` (eq. 4.2)."""
         return Judgement(geometric_mean(self.aggregated(log_utilities)), log_utilities)
 
     def aggregated(self, log_utilities: Floats) -> Floats:

@@ -27,8 +27,6 @@ from gaitswarm.cli.output import note
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.measurement.measured_binary import format_mcap, format_npz
-from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import (
     ORIGIN,
     SYNTHETIC,
@@ -44,6 +42,7 @@ from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parame
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from gaitswarm.sim.variables import VariableName
+from scripts.measured_logs import format_mcap, format_measured_log, format_npz
 
 Floats = NDArray[np.float64]
 

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.measurement.measured_csv import (
     TIME,
-    columns_of_log,
     expected_channels,
     heading,
     log_of_columns,
@@ -32,9 +31,6 @@ Floats = NDArray[np.float64]
 
 LARGEST: Final = 1 << 30
 """Largest unpacked size of an npz file [B]."""
-
-_MCAP_NAME: Final = "gaitswarm"
-"""Of the topic, the schema and the metadata record."""
 
 
 def parse_npz(content: bytes, robot: Robot) -> MeasuredLog:
@@ -78,12 +74,6 @@ def _arrays(content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
         raise MeasuredLogError(f"not an npz file of plain arrays: {error}") from error
 
 
-def format_npz(log: MeasuredLog) -> bytes:
-    file = io.BytesIO()
-    np.savez_compressed(file, **{**columns_of_log(log), **log.metadata})  # type: ignore[arg-type]
-    return file.getvalue()
-
-
 def parse_mcap(content: bytes, robot: Robot) -> MeasuredLog:
     mcap = _mcap()
     metadata: dict[str, str] = {}
@@ -119,28 +109,10 @@ def _numbers(data: bytes, row: int) -> Mapping[str, float]:
     return {name: float(value) for name, value in fields.items()}
 
 
-def format_mcap(log: MeasuredLog) -> bytes:
-    file = io.BytesIO()
-    writer = _mcap().writer.Writer(file)
-    writer.start(library=_MCAP_NAME)
-    columns = columns_of_log(log)
-    fields = {"type": "object", "additionalProperties": {"type": "number"}}
-    schema = writer.register_schema(_MCAP_NAME, "jsonschema", json.dumps(fields).encode())
-    channel = writer.register_channel(_MCAP_NAME, "json", schema)
-    for row in np.column_stack(list(columns.values())).tolist():
-        data = json.dumps(dict(zip(columns, row, strict=True))).encode()
-        nanoseconds = round(row[0] * 1e9)
-        writer.add_message(channel, nanoseconds, data, nanoseconds)
-    writer.add_metadata(_MCAP_NAME, dict(log.metadata))
-    writer.finish()
-    return file.getvalue()
-
-
 def _mcap() -> Any:
     try:
         import mcap.exceptions  # noqa: PLC0415
         import mcap.reader  # noqa: PLC0415
-        import mcap.writer  # noqa: PLC0415
     except ImportError as error:
         raise MeasuredLogError("MCAP files need `pip install 'gaitswarm[mcap]'`") from error
     return mcap

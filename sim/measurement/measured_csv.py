@@ -30,9 +30,6 @@ from gaitswarm.sim.robot import Robot
 
 Floats = NDArray[np.float64]
 
-TITLE: Final = "gaitswarm measured log 1"
-"""First line; 1 is the version of the format."""
-
 TIME: Final = "time [s]"
 
 MIN_ROWS: Final = 100
@@ -64,15 +61,6 @@ def log_of_columns(
         return _checked(robot, dict(metadata), headings, places, values, rows, None)
     except MeasuredLogError as error:
         raise MeasuredLogError(error.problem, row=error.line, column=error.column) from error
-
-
-def columns_of_log(log: MeasuredLog) -> dict[str, Floats]:
-    """Return the columns (T,) of a log by heading."""
-    return {TIME: log.time} | {
-        heading(quantity, channel): column
-        for quantity in Quantity
-        for channel, column in zip(log.channels(quantity), log.values(quantity).T, strict=True)
-    }
 
 
 def _checked(
@@ -118,38 +106,9 @@ def _checked(
     )
 
 
-def format_measured_log(log: MeasuredLog) -> str:
-    """Format a log; parsing the text gives bit-identical numbers."""
-    for key, value in log.metadata.items():
-        if not _is_remark(key, value):
-            raise MeasuredLogError(f"metadata {key!r}: {value!r} is not one printable line")
-    columns = columns_of_log(log)
-    rows = np.column_stack(list(columns.values())).tolist()
-    return "\n".join(
-        [
-            f"# {TITLE}",
-            *(f"# {key}: {value}" for key, value in log.metadata.items()),
-            ",".join(columns),
-            *(",".join(map(repr, row)) for row in rows),
-            "",
-        ]
-    )
-
-
 def heading(quantity: Quantity, channel: str) -> str:
     """A column's heading in the file: `I_M.left_rear_tibia [A]`."""
     return f"{quantity}.{channel} [{quantity.unit}]"
-
-
-def _is_remark(key: str, value: str) -> bool:
-    line = f"{key}: {value}"
-    return (
-        len(line.splitlines()) == 1
-        and line.isprintable()
-        and ":" not in key
-        and key == key.strip() != ""
-        and value == value.strip() != ""
-    )
 
 
 def _head(lines: Iterator[tuple[int, str]]) -> tuple[dict[str, str], int, list[str]]:

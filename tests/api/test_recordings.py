@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.identification import RecordedWalk
-from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
 from gaitswarm.sim.robot import load_robot
+from scripts.measured_logs import format_measured_log
 from tests.api.conftest import Serve
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk
 

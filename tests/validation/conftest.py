@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import pytest
 
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, simulated_log
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.scenario import Scenario, find_scenario
+from scripts.measured_logs import format_measured_log
 from scripts.synthesize import synthetic_log
 from tests.examples.walks import PUBLISHED_A, logged_walk
 

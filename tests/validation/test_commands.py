@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.cli.main import run
-from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.sim.validation import Tolerance, compare
+from scripts.measured_logs import format_measured_log
 from tests.examples.commands import Result, run_command, synthesize
 from tests.examples.paths import QUADRUPED
 from tests.validation.conftest import TwoWalks

@@ -13,14 +13,9 @@ import pytest
 
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.measurement import measured_binary
-from gaitswarm.sim.measurement.measured_binary import (
-    format_mcap,
-    format_npz,
-    parse_mcap,
-    parse_npz,
-)
-from gaitswarm.sim.measurement.measured_csv import columns_of_log
+from gaitswarm.sim.measurement.measured_binary import parse_mcap, parse_npz
 from gaitswarm.sim.measurement.measured_log import MeasuredLog
+from scripts.measured_logs import columns_of_log, format_mcap, format_npz
 from tests.validation.test_measured_csv import assert_same, small_log
 from tests.validation.walks import szabadka, without_supplements
 

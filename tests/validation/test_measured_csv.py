@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
-from gaitswarm.sim.measurement.measured_csv import format_measured_log, parse_measured_log
+from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
 from gaitswarm.sim.robot import Robot
+from scripts.measured_logs import format_measured_log
 from tests.validation.walks import renamed_robot, szabadka, walking_log, without_supplements
 
 ROWS = 120

@@ -9,7 +9,7 @@ import pytest
 
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification import CurrentFit, record
-from gaitswarm.sim.measurement.measured_csv import format_measured_log, parse_measured_log
+from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import (
     MeasuredLog,
     MeasuredWalk,
@@ -21,6 +21,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.validation import compare_synchronised
+from scripts.measured_logs import format_measured_log
 from scripts.synthesize import Instruments, Perturbation, synthetic_log
 from tests.examples.walks import short_walk, torque_quadruped_files
 

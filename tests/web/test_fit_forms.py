@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredWalk
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotFiles, load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.scenario import find_scenario
+from scripts.measured_logs import format_measured_log
 from tests.examples.paths import QUADRUPED
 from tests.examples.servers import ServerProcess
 from tests.examples.walks import PUBLISHED_A

@@ -31,7 +31,7 @@ _FOLDERS: Final = ("jobs/kinds", "search")
 class JobProvenance(BaseModel):
     """Code and libraries that a job's results depend on."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     gaitswarm: str = Field(
         description="Version of gaitswarm, for information; the digests identify the code.",
@@ -62,7 +62,7 @@ class JobProvenance(BaseModel):
 class ProvenanceRecord(BaseModel):
     """Provenance of a job's results from an iteration on."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     from_iteration: int = Field(
         ge=0, description="First iteration with this provenance, from 0.", examples=[0]

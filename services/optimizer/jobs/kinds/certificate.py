@@ -256,7 +256,7 @@ class CertificateSpec(WalksSpec):
         examples=[dict(CONTROLLERS["fuzzy-pi"].published["A"])],
     )
     scenarios: tuple[ScenarioChoice, ...] = Field(
-        default=tuple(scenario.name for scenario in certificate_scenarios()),
+        default=(*(scenario.name for scenario in SCENARIOS), *_MIRRORED),
         min_length=1,
         max_length=32,
         description="Scenarios simulated in every world: names or numbers of presets (see"

@@ -23,6 +23,7 @@ from gaitswarm.sim.robot.actuators import TorqueActuator
 from gaitswarm.sim.robot.description import RobotDescription
 from gaitswarm.sim.robot.shapes import VisibleLink
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.worlds import ground_of
 from gaitswarm.simulation import QUANTITIES
 
 VERSION: Final = 1
@@ -84,6 +85,16 @@ class MovingRobotView(View):
     )
 
 
+class HeightsView(View):
+    """Uneven ground around a walk; between its points heights are bilinear."""
+
+    x: list[float] = Field(description="Places of the rows [m].", examples=[[-0.5, 0.5]])
+    y: list[float] = Field(description="Places of a row's heights [m].", examples=[[-0.5, 0.5]])
+    z: list[list[float]] = Field(
+        description="Heights by row [m].", examples=[[[0.0, 0.01], [0.0, 0.02]]]
+    )
+
+
 class GroundView(View):
     """The ground; the world's z axis is normal to it, so gravity is tilted."""
 
@@ -92,6 +103,9 @@ class GroundView(View):
         description="Where it rises, from straight ahead towards the left [deg].", examples=[0.0]
     )
     normal: Vector = Field(default=(0.0, 0.0, 1.0), description="Its normal in the world [1].")
+    heights: HeightsView | None = Field(
+        default=None, description="Its heights; null if it is flat."
+    )
 
 
 class ChannelView(View):
@@ -175,7 +189,11 @@ def run_replay(request: ReplayRequest) -> bytes:
             torque_limits=list(torques),
             current_limits=list(currents),
         ),
-        ground=GroundView(slope_deg=scenario.slope, slope_direction_deg=scenario.slope_direction),
+        ground=GroundView(
+            slope_deg=scenario.slope,
+            slope_direction_deg=scenario.slope_direction,
+            heights=_heights(request, scenario, walk),
+        ),
         gravity=(x, y, z),
         load_kg=scenario.load,
         channels=channels,
@@ -193,6 +211,29 @@ def _limits(robot: RobotDescription) -> Iterator[tuple[float, float]]:
             gear, motor = robot.gearheads[actuator.gearhead], robot.motors[actuator.motor]
             stall = robot.supply.voltage / motor.resistance
             yield gear.nominal_torque * actuator.bevel, stall
+
+
+_MARGIN: Final = 0.4
+"""Distance from the feet to which uneven ground is shown [m]."""
+
+_MOST_ROWS: Final = 200
+
+
+def _heights(request: ReplayRequest, scenario: Scenario, walk: Replay) -> HeightsView | None:
+    world = request.world or {}
+    seed = round(world.get("world_seed", 0.0))
+    ground = ground_of(scenario, world.get("roughness", 0.0), seed)
+    if ground is None:
+        return None
+    axes = []
+    for axis, cells in enumerate(ground.cells):
+        feet = walk.foot_position[:, :, axis]
+        low, high = float(feet.min()) - _MARGIN, float(feet.max()) + _MARGIN
+        rows = min(2 + math.ceil((high - low) / ground.cell) * (cells > 1), _MOST_ROWS)
+        axes.append(np.linspace(low, high, rows).round(4))
+    x, y = axes
+    z = ground.height(*np.meshgrid(x, y, indexing="ij")).round(4)
+    return HeightsView(x=x.tolist(), y=y.tolist(), z=z.tolist())
 
 
 def _channels(walk: Replay, joints: Sequence[str], legs: Sequence[str]) -> list[ChannelView]:

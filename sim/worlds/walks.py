@@ -25,7 +25,7 @@ from gaitswarm.sim.robot import Robot, RobotSource, load_robot
 from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles, rotated
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, plan_of_scenario, walking
-from gaitswarm.sim.terrain import HeightGrid, Plane, Rough, rough_grid
+from gaitswarm.sim.terrain import HeightGrid, Plane, Rough, height_grid, rough_grid
 from gaitswarm.sim.worlds.perturbations import NOMINAL, check_worlds
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,11 @@ def perturbed_setups(
         name: columns.get(name, np.full(len(worlds), default)) for name, default in NOMINAL.items()
     }
     parameters = _parameters(robot, scenario, nominal.parameters, values)
-    grounds = _grounds(scenario, nominal, values)
+    seeds = map(round, values["world_seed"].tolist())
+    grounds = [
+        ground_of(scenario, roughness, seed)
+        for roughness, seed in zip(values["roughness"].tolist(), seeds, strict=True)
+    ]
     starts = _starts(robot, scenario, nominal, parameters, values, grounds)
     internal_states = np.tile(nominal.internal_state, (len(worlds), 1))
     if robot.has_backlash:
@@ -80,22 +84,27 @@ def perturbed_setups(
     ]
 
 
-def _grounds(
-    scenario: Scenario, nominal: WalkSetup, values: Mapping[str, Floats]
-) -> list[HeightGrid | None]:
-    """Uneven ground of every world; the world's seed is the place at which the robot starts."""
-    terrain, roughness = scenario.terrain, values["roughness"].tolist()
-    if any(roughness) and not isinstance(terrain, Plane | Rough):
+def check_grounds(scenarios: Sequence[Scenario], variables: Sequence[str], worlds: Floats) -> None:
+    """Reject worlds (n, len(variables)) that roughen ground of another kind."""
+    for scenario in scenarios:
+        for roughness in worlds[:, [name == "roughness" for name in variables]].ravel().tolist():
+            ground_of(scenario, roughness)
+
+
+def ground_of(scenario: Scenario, roughness: float = 0.0, seed: int = 0) -> HeightGrid | None:
+    """Return the uneven ground of a world, whose seed is the place at which the robot starts."""
+    terrain = scenario.terrain
+    if roughness and not isinstance(terrain, Plane | Rough):
         raise SimulationInputError(
             f"roughness: the ground of scenario {scenario.name!r} is of kind {terrain.kind};"
             " worlds add roughness to planes and rough ground only"
         )
-    rough = rough_grid(
-        terrain if isinstance(terrain, Rough) else Rough(kind="rough", amplitude=0.0)
-    )
-    grounds = [replace(rough, scale=scale) if scale else nominal.terrain for scale in roughness]
-    seeds = map(round, values["world_seed"].tolist())
-    return [ground and ground.placed(seed) for ground, seed in zip(grounds, seeds, strict=True)]
+    if roughness:
+        known = terrain if isinstance(terrain, Rough) else Rough(kind="rough", amplitude=0.0)
+        ground: HeightGrid | None = replace(rough_grid(known), scale=roughness)
+    else:
+        ground = height_grid(terrain)
+    return ground and ground.placed(seed)
 
 
 def _parameters(

@@ -136,11 +136,26 @@ def test_on_a_slope_gravity_is_tilted_and_the_ground_is_not(client: httpx2.Clien
         "slope_deg": 10.0,
         "slope_direction_deg": 90.0,
         "normal": [0.0, 0.0, 1.0],
+        "heights": None,
     }
     # It rises to the left, so that the robot is drawn to the right.
     expected = [0.0, -9.81 * np.sin(np.radians(10.0)), -9.81 * np.cos(np.radians(10.0))]
     assert header["gravity"] == pytest.approx(expected)
     assert channels["link_pose"][-1, 0, 1] < 0.0
+
+
+def test_uneven_ground_of_a_world_lies_below_the_feet_that_it_carries(
+    client: httpx2.Client,
+) -> None:
+    world = {"roughness": 0.02, "world_seed": 7}
+    header, channels = replayed(client, scenario=SHORT_WALK, world=world)
+    x, y, z = (np.array(header["ground"]["heights"][axis]) for axis in "xyz")
+    assert z.shape == (len(x), len(y)) and 0.01 < np.ptp(z) <= 0.04
+    feet = channels["foot_position"][0]
+    rows, columns = (np.abs(axis[:, None] - feet[:, k]).argmin(0) for k, axis in enumerate((x, y)))
+    above = feet[:, 2] - z[rows, columns]
+    # At the start the highest soles carry the robot, pressed into the ground; the others hover.
+    assert -0.02 < above.min() < 0.01 and above.max() < 0.05
 
 
 def test_the_scenario_is_shown_as_the_designs_gait_walked_it(client: httpx2.Client) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
 from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.errors import SimulationInputError
@@ -177,6 +179,14 @@ def test_worlds_do_not_roughen_stairs() -> None:
     )
     with pytest.raises(SimulationInputError, match=r"roughness: .* kind stairs"):
         case.run(np.array([[0.01]]))
+
+
+def test_jobs_do_not_roughen_stairs() -> None:
+    stairs = {**on(STAIRS).model_dump()}
+    worlds = {"count": 2, "ranges": ["roughness"]}
+    spec = JobSpec.model_validate({"controller": "pi", "scenarios": [stairs], "worlds": worlds})
+    with pytest.raises(InvalidRequest, match=r"roughness: .* kind stairs"):
+        spec.check_can_be_simulated()
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,7 @@ from gaitswarm.sim.worlds import (
     PERTURBATIONS,
     EngineWalk,
     WorldWalk,
+    check_grounds,
     check_worlds,
     sample_worlds,
 )
@@ -436,7 +437,9 @@ class CertificateSpec(WalksSpec):
         space = self.world_space()
         corners = np.stack([space.low, space.high])
         with space.requested():
-            check_worlds(space.names, space.simulated(space.designs(corners)))
+            worlds = space.simulated(space.designs(corners))
+            check_worlds(space.names, worlds)
+            check_grounds(self.resolved_scenarios(), space.names, worlds)
 
     @property
     def held_out_names(self) -> tuple[str, ...]:

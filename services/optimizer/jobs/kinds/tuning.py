@@ -52,7 +52,7 @@ from gaitswarm.sim.plugins import PluginSettings
 from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice, Scenarios
 from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
-from gaitswarm.sim.worlds import check_worlds
+from gaitswarm.sim.worlds import check_grounds, check_worlds
 from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk
 
 Floats = NDArray[np.float64]
@@ -299,7 +299,9 @@ class JobSpec(WalksSpec):
             variables = self.worlds.variables()
             ends = np.array([[v.low for v in variables], [v.high for v in variables]])
             with simulation_errors("worlds.ranges"):
-                check_worlds(tuple(v.name for v in variables), ends)
+                names = tuple(v.name for v in variables)
+                check_worlds(names, ends)
+                check_grounds(scenarios, names, ends)
         searches_posture = any(split_name(v.name)[0] in _POSTURE for v in space.variables)
         gentlest = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
         orders = orders_searched(space.variables)

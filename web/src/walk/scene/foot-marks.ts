@@ -76,12 +76,13 @@ export class FootMarks {
     this.replay.sample('foot_position', time, this.positions)
     this.replay.sample('foot_force', time, this.forces)
     this.discs.forEach((disc, leg) => {
-      const [x, y] = this.positions.subarray(3 * leg, 3 * leg + 2)
+      const [x, y, z] = this.positions.subarray(3 * leg, 3 * leg + 3)
+      const height = this.replay.header.ground.heights ? z : this.height
       this.force.fromArray(this.forces, 3 * leg)
       const size = this.force.length()
       disc.visible = size > CONTACT_FORCE
-      disc.position.set(x, y, this.height)
-      this.arrows[leg].point(x, y, this.height, this.force, size * this.scale)
+      disc.position.set(x, y, height)
+      this.arrows[leg].point(x, y, height, this.force, size * this.scale)
       this.arrows[leg].object.visible = disc.visible && this.withForces
     })
     this.showSupport()

@@ -1,7 +1,18 @@
-/** Ground plane with a labelled grid that fades into the distance. */
+/** Ground plane with a labelled grid that fades into the distance, and uneven ground above it. */
 
-import { Group, Mesh, PlaneGeometry, ShaderMaterial, ShadowMaterial, Vector2 } from 'three'
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Group,
+  Mesh,
+  MeshLambertMaterial,
+  PlaneGeometry,
+  ShaderMaterial,
+  ShadowMaterial,
+  Vector2,
+} from 'three'
 import type { Extent } from '../replay/extent'
+import type { Replay } from '../replay/replay'
 import { lyingText } from './label'
 import type { Palette } from './palette'
 import { disposeTree } from './renderer'
@@ -56,11 +67,35 @@ void main() {
   #include <colorspace_fragment>
 }`
 
+type Heights = NonNullable<Replay['header']['ground']['heights']>
+
+/** Uneven ground as triangles. */
+export function heightMesh({ x, y, z }: Heights): Mesh<BufferGeometry, MeshLambertMaterial> {
+  const places = x.flatMap((along, i) => y.flatMap((across, j) => [along, across, z[i][j]]))
+  const corners: number[] = []
+  for (let i = 0; i + 1 < x.length; i++) {
+    for (let j = 0; j + 1 < y.length; j++) {
+      const [near, far] = [i * y.length + j, (i + 1) * y.length + j]
+      corners.push(near, far, near + 1, near + 1, far, far + 1)
+    }
+  }
+  const geometry = new BufferGeometry()
+  geometry.setAttribute('position', new BufferAttribute(Float32Array.from(places), 3))
+  geometry.setIndex(corners)
+  geometry.computeVertexNormals()
+  const mesh = new Mesh(geometry, new MeshLambertMaterial())
+  mesh.receiveShadow = true
+  return mesh
+}
+
 export class Ground {
   readonly object = new Group()
   private readonly plane: Mesh<PlaneGeometry, ShaderMaterial>
   private readonly shade: Mesh<PlaneGeometry, ShadowMaterial>
   private labels = new Group()
+  private readonly uneven: ReturnType<typeof heightMesh> | null
+  /** Height of the plane, below uneven ground [m]. */
+  private readonly floor: number
 
   constructor(
     /** Largest distance walked [m]. */
@@ -69,6 +104,7 @@ export class Ground {
     private readonly labelOffset: number,
     private readonly extent: Extent,
     shadows: boolean,
+    heights?: Heights | null,
   ) {
     const edge = EDGE * extent.span
     const material = new ShaderMaterial({
@@ -87,10 +123,15 @@ export class Ground {
     this.plane = new Mesh(new PlaneGeometry(edge, edge), material)
     this.plane.renderOrder = -2
     this.shade = new Mesh(new PlaneGeometry(edge, edge), new ShadowMaterial())
+    const levels = heights?.z.flat() ?? [0]
+    this.floor = Math.min(0, ...levels)
+    this.labels.position.z = Math.max(0, ...levels)
     this.moveTo(0, 0)
     this.shade.receiveShadow = true
-    this.shade.visible = shadows
+    this.shade.visible = shadows && !heights
     this.object.add(this.plane, this.shade, this.labels)
+    this.uneven = heights ? heightMesh(heights) : null
+    if (this.uneven) this.object.add(this.uneven)
   }
 
   recolour(colours: Palette): void {
@@ -99,12 +140,13 @@ export class Ground {
       uniforms[name].value = colours[name]
     }
     this.shade.material.opacity = colours.shadow
+    this.uneven?.material.color.copy(colours.ground)
     this.relabel(colours.text)
   }
 
   /** Keep the plane under the robot; its grid stays fixed. */
   moveTo(x: number, y: number): void {
-    this.plane.position.set(x, y, 0)
+    this.plane.position.set(x, y, this.floor)
     this.shade.position.set(x, y, 0.5 * LIFT * this.extent.span)
     this.plane.material.uniforms.origin.value.set(x, y)
   }

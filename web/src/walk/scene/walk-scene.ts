@@ -111,6 +111,7 @@ export class WalkScene {
       -LABELS * width - (replays.length > 1 ? this.spacing / 2 : 0),
       extent,
       this.renderer.shadowMap.enabled,
+      ground.heights,
     )
     this.world.add(this.ground.object, ...this.lanes.map((lane) => lane.group))
     this.slope = slopeMark(ground, tilt, span)

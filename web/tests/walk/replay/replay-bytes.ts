@@ -44,7 +44,7 @@ export function header(count: number, changes: Partial<ReplayHeader> = {}): Repl
       torque_limits: [3],
       current_limits: [5],
     },
-    ground: { slope_deg: 0, slope_direction_deg: 0, normal: [0, 0, 1] },
+    ground: { slope_deg: 0, slope_direction_deg: 0, normal: [0, 0, 1], heights: null },
     gravity: [0, 0, -9.81],
     load_kg: 0,
     channels: CHANNELS,

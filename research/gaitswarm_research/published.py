@@ -28,7 +28,21 @@ CALLS: Final = 5000
 """Evaluations of a run on the test function."""
 
 CHECKPOINTS: Final = (100, 250, 625)
-RIVALS: Final = ("cma", "optuna-cma-es", "optuna-tpe", "pymoo-pso", "scipy-de")
+RIVALS: Final = (
+    *("catcmawm", "cma", "optuna-cma-es", "optuna-gp", "optuna-tpe", "pymoo-pso", "scipy-de"),
+)
+
+SMALL_BUDGETS: Final = (50, 100, 250)
+JOBS: Final = {
+    "chapter-4.A": "chapter 4",
+    "chapter-3.pi": "chapter 3, PI",
+    "chapter-3.fuzzy-pi": "Fuzzy-PI",
+    "constrained.A-gait": "constrained",
+}
+"""Titles of the jobs of small budgets."""
+
+ADAPTING: Final = ("de", "pso", "pso-ps")
+"""Methods whose runs depend on the budget, or that are not compared at small ones."""
 
 ENOUGH: Final = 4
 """Least number of runs whose median is shown."""
@@ -117,6 +131,31 @@ def robot_table(medians: Mapping[str, Medians]) -> str:
             best = _value(
                 min(of.by_problem[problem][k] for of in sure.values() if problem in of.by_problem)
             )
+            columns.append([f"**{text}**" if text == best else text for text in texts])
+    return _markdown(head, columns)
+
+
+def small_budgets_table(data: Path = DATA) -> str:
+    """Medians with the present swing after `SMALL_BUDGETS`, by job; the least of a column is bold.
+
+    The recorded methods do not adapt to their budget.
+    """
+    runs: dict[tuple[str, str], list[list[float]]] = {}
+    for row in (*_rows(data / "small-budgets.csv"), *_rows(data / "half-ellipse.csv")):
+        if row["problem"] in JOBS and row["method"] not in ADAPTING:
+            curve = [_number(row[f"best_{count}"]) for count in SMALL_BUDGETS]
+            runs.setdefault((row["method"], row["problem"]), []).append(curve)
+    methods = dict.fromkeys(method for method, _ in runs)
+    head, columns = ["method"], [[_styled(method) for method in methods]]
+    for problem, title in JOBS.items():
+        rows = {m: runs.get((m, problem), []) for m in methods}
+        medians = {m: _median(of) for m, of in rows.items() if len(of) >= ENOUGH}
+        head.append(f"{title}: runs")
+        columns.append([str(len(rows[m])) if m in medians else "-" for m in methods])
+        for k, most in enumerate(SMALL_BUDGETS):
+            head.append(str(most))
+            texts = [_value(medians[m][k]) if m in medians else "-" for m in methods]
+            best = _value(min(values[k] for values in medians.values()))
             columns.append([f"**{text}**" if text == best else text for text in texts])
     return _markdown(head, columns)
 
@@ -253,6 +292,7 @@ def _markdown(head: Sequence[str], columns: Sequence[Sequence[str]]) -> str:
 if __name__ == "__main__":
     on_robot = robot_medians()
     lines = [robot_table(on_robot), "", functions_table(function_scores()), ""]
+    lines += [small_budgets_table(), ""]
     for checkpoint, (value, low, high) in zip(CHECKPOINTS, correlations(on_robot), strict=True):
         lines.append(f"correlation after {checkpoint}: {value:.2f} ({low:.2f} to {high:.2f})")
     print("\n".join(lines))  # noqa: T201

@@ -12,6 +12,7 @@ from gaitswarm_research.published import (
     functions_table,
     robot_medians,
     robot_table,
+    small_budgets_table,
 )
 
 PAGE = (Path(__file__).parents[1] / "docs" / "comparison.md").read_text(encoding="utf-8")
@@ -19,6 +20,10 @@ PAGE = (Path(__file__).parents[1] / "docs" / "comparison.md").read_text(encoding
 
 def test_the_page_has_the_medians_on_the_robot() -> None:
     assert robot_table(robot_medians()) in PAGE
+
+
+def test_the_page_has_the_medians_at_small_budgets() -> None:
+    assert small_budgets_table() in PAGE
 
 
 def test_the_page_has_the_ranks_on_the_test_functions() -> None:

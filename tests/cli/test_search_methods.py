@@ -88,8 +88,8 @@ def test_wrong_settings_name_the_field_and_the_way_out(
 
 
 def test_auto_is_stored_as_the_selected_method(gaitswarm: Gaitswarm, db: Path) -> None:
-    found = submitted(gaitswarm, db, "--optimizer", "auto", "--particles", 9)
-    assert found == submitted(gaitswarm, db, "--particles", 9)
+    found = submitted(gaitswarm, db, "--optimizer", "auto", "--particles", 11)
+    assert found == submitted(gaitswarm, db, "--particles", 11)
 
 
 def test_progress_of_uneven_iterations_is_in_designs(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -27,18 +28,18 @@ def test_it_stands_for_the_default_method() -> None:
 @pytest.mark.parametrize(
     ("dimension", "budget", "method"),
     [
-        (1, 101, "cma-es"),
-        (64, 101, "cma-es"),
-        (65, 101, "de"),
-        (64, 100, "bayesian"),
-        (65, 100, "de"),
+        (1, 251, "cma-es"),
+        (64, 251, "cma-es"),
+        (65, 251, "de"),
+        (64, 250, "bayesian"),
+        (65, 250, "de"),
     ],
 )
 def test_it_goes_by_the_numbers_of_variables_and_evaluations(
     dimension: int, budget: int, method: str
 ) -> None:
     space = Space([Axis(0.0, 1.0)] * dimension)
-    assert chosen_method(AutoSettings(particles=7), space, budget).name == method
+    assert chosen_method(AutoSettings(particles=7), space, budget, starts=False).name == method
     given, expected = (
         create_search({"name": n, "particles": 7}, space, budget, 1) for n in ("auto", method)
     )
@@ -47,14 +48,29 @@ def test_it_goes_by_the_numbers_of_variables_and_evaluations(
 
 def test_it_centres_integers_where_they_are_most_of_the_variables() -> None:
     space = Space([Axis(0.0, 9.0, "integer")] * 2 + [Axis(0.0, 1.0)])
-    assert chosen_method(AutoSettings(particles=7), space, 999).model_dump() == {
+    assert chosen_method(AutoSettings(particles=7), space, 999, starts=False).model_dump() == {
         **OPTIMIZERS["cma-es"].model_dump(),
         "particles": 7,
         "sigma": 0.1,
         "integers": "centred",
     }
     half = Space(space.axes[1:])
-    assert chosen_method(AutoSettings(), half, 999) == OPTIMIZERS["cma-es"]
+    assert chosen_method(AutoSettings(), half, 999, starts=True) == OPTIMIZERS["cma-es"]
+
+
+def test_a_search_with_a_start_needs_no_model() -> None:
+    space, start = Space([Axis(0.0, 1.0)] * 2), np.full((1, 2), 0.5)
+    given, expected = (create_search(name, space, 100, 1, start) for name in ("auto", "cma-es"))
+    for optimizer in (given, expected):
+        optimizer.tell(np.ones(len(optimizer.ask())))
+    assert given.ask().tobytes() == expected.ask().tobytes()
+
+
+def test_a_reference_of_constraints_is_a_start(store: Store) -> None:
+    small = {"optimizer": "auto", "iterations": 4}
+    constrained = {**small, "constraints": ["*<=published:A"]}
+    jobs = [JobService(store).submit(JobSpec.model_validate(d))[0] for d in (small, constrained)]
+    assert [job.spec.optimizer.name for job in jobs] == ["bayesian", "cma-es"]
 
 
 def test_the_size_of_iterations_stays_and_with_it_the_budget() -> None:

@@ -191,7 +191,8 @@ class Spec(BaseModel):
     def search(self) -> OptimizerSettings:
         """Settings of the search method; for `auto`, of the method that it selects."""
         if isinstance(self.optimizer, AutoSettings):
-            return chosen_method(self.optimizer, self.design_space().box, self.budget)
+            space, starts = self.design_space().box, bool(self.start)
+            return chosen_method(self.optimizer, space, self.budget, starts=starts)
         return self.optimizer
 
     @model_validator(mode="after")

@@ -123,15 +123,20 @@ _LARGEST_DIMENSION: Final = 64
 """Variables up to which CMA-ES is chosen; its decomposition costs the cube of the dimension."""
 
 
-_FEW_EVALUATIONS: Final = 100
+_FEW_EVALUATIONS: Final = 250
 """Budget up to which Bayesian optimization is chosen, whose first designs come one by one."""
 
 
-def chosen_method(settings: AutoSettings, space: Space, budget: int) -> SearchSettings:
-    """Choose the method of a search by the numbers of variables and evaluations."""
+def chosen_method(
+    settings: AutoSettings, space: Space, budget: int, *, starts: bool
+) -> SearchSettings:
+    """Choose the method of a search by its variables and evaluations, and whether it has a start.
+
+    Near a start, the Gaussian process does not look far enough.
+    """
     if space.dimension > _LARGEST_DIMENSION:
         return DeSettings(particles=settings.particles)
-    if budget <= _FEW_EVALUATIONS:
+    if budget <= _FEW_EVALUATIONS and not starts:
         return BayesianSettings(particles=settings.particles)
     if space.mostly_integer:
         return CmaEsSettings(particles=settings.particles, sigma=0.1, integers="centred")
@@ -139,7 +144,7 @@ def chosen_method(settings: AutoSettings, space: Space, budget: int) -> SearchSe
 
 
 def _create_chosen(settings: AutoSettings, space: Space, budget: int, seed: int) -> Optimizer:
-    return create_search(chosen_method(settings, space, budget), space, budget, seed)
+    return create_search(chosen_method(settings, space, budget, starts=False), space, budget, seed)
 
 
 class RandomSearchSettings(SearchSettings):
@@ -163,8 +168,8 @@ def random_search(
 _BUILT_IN: Final[dict[str, Method]] = {
     "auto": Method(
         AutoSettings,
-        "Bayesian for up to 100 evaluations, else CMA-ES, its settings by the share of integers, or"
-        " differential evolution for more than 64 variables; chosen on submission",
+        "Bayesian for up to 250 evaluations without a start, else CMA-ES, its settings by the share"
+        " of integers, or differential evolution for more than 64 variables; chosen on submission",
         _create_chosen,
         uses_start=True,
     ),
@@ -331,7 +336,10 @@ def create_search(
             raise ValueError(OPTIMIZERS.unknown(name))
         chosen = OPTIMIZERS[name]
         settings = chosen if isinstance(settings, str) else type(chosen).model_validate(settings)
+    starts = start is not None and len(start) > 0
+    if isinstance(settings, AutoSettings):
+        settings = chosen_method(settings, space, budget, starts=starts)
     optimizer = METHODS[settings.name].create(settings, space, budget, seed)
-    if start is not None and len(start):
+    if start is not None and starts:
         optimizer.start_from(start)
     return optimizer

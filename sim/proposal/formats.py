@@ -31,7 +31,7 @@ def as_urdf(
         arguments: Values of its <xacro:arg>.
 
     Returns:
-        The URDF, and what was left out, one sentence each.
+        The URDF, and what was left out or assumed, one sentence each.
     """
     form = format_of(text)
     if form == "xacro":

@@ -27,7 +27,7 @@ def mjcf_to_urdf(text: str, path: Path | None = None) -> tuple[str, list[str]]:
     """Convert MJCF; None as the path of its file marks it as untrusted.
 
     Returns:
-        The URDF of the tree with most mass, and what was left out, one sentence each.
+        The URDF of the tree with most mass, and what was left out or assumed, one sentence each.
     """
     if path is None:
         check_urdf(text)
@@ -51,6 +51,8 @@ def mjcf_to_urdf(text: str, path: Path | None = None) -> tuple[str, list[str]]:
         raise RobotFileError(f"robot.urdf: MuJoCo cannot compile it: {said}") from error
     if model.neq:
         notes.append(f"{model.neq} equality constraints are left out: loops and couplings are open")
+    if model.nu:
+        notes.append(f"MJCF has no speed limits: {_SPEED:g} rad/s are assumed")
     return _urdf_of(spec, model, notes), notes
 
 
@@ -91,6 +93,9 @@ _SHAPES: Final = {2: "sphere", 3: "capsule", 5: "cylinder", 6: "box"}
 """By MuJoCo's number."""
 
 _MESH: Final = 7
+
+_SPEED: Final = 20.0
+"""Speed limit of joints with actuators, which have none in MuJoCo [rad/s]."""
 
 _FAR: Final = 1000.0
 """Limit of a sliding joint without limits [m]."""
@@ -158,7 +163,8 @@ def _add_joint(
     joint = _connect(robot, name, kind, parent, child, place, turn)
     ET.SubElement(joint, "axis", xyz=_text(model.jnt_axis[number]))
     limits = {} if kind == "continuous" else {"lower": f"{lower:.9g}", "upper": f"{upper:.9g}"}
-    ET.SubElement(joint, "limit", limits | {"effort": f"{efforts[number]:.9g}", "velocity": "0"})
+    effort, speed = efforts[number], _SPEED if efforts[number] > 0.0 else 0.0
+    ET.SubElement(joint, "limit", limits | {"effort": f"{effort:.9g}", "velocity": f"{speed:g}"})
 
 
 def _efforts(model: Any) -> Floats:

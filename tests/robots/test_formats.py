@@ -57,7 +57,7 @@ def leg(name: str, x: int, y: int) -> str:
     return f"""
   <body name="{name}_thigh" pos="{0.2 * x} {0.05 * y} 0.01" euler="0 0 10">
     <inertial pos="0 0 -0.1" mass="1" diaginertia="0.01 0.01 0.001" euler="0 20 0"/>
-    <joint name="{name}_roll" axis="1 0 0" pos="0 0 0.02" range="-45 45"/>
+    <joint name="{name}_roll" axis="1 0 0" pos="0.03 0.02 0.02" range="-45 45"/>
     <joint name="{name}_pitch" axis="0 1 0" pos="0 {0.08 * y} 0" range="-60 200" ref="5"/>
     <geom class="looks" mesh="lost"/>
     <body name="{name}_calf" pos="0 {0.08 * y} -0.22">
@@ -175,7 +175,7 @@ def test_an_untrusted_xacro_text_reaches_no_files_and_no_objects(text: str) -> N
 
 def test_mjcf_becomes_a_urdf_with_the_same_motion() -> None:
     urdf, left_out = as_urdf(MJCF)
-    assert left_out == ["meshes that are not at hand: lost"]
+    assert left_out[0] == "meshes that are not at hand: lost"
     model = mujoco.MjModel.from_xml_string(
         MJCF.replace('<geom class="looks" mesh="lost"/>', "")
         .replace('<mesh name="lost" file="lost.stl"/>', "")
@@ -202,6 +202,9 @@ def test_mjcf_becomes_a_urdf_with_the_same_motion() -> None:
         mass = pin.crba(ours, ours_data, q)
         mass = np.triu(mass) + np.triu(mass, 1).T
         np.testing.assert_allclose(mass[np.ix_(columns, columns)], full[6:, 6:], atol=1e-8)
+        pin.forwardKinematics(ours, ours_data, q)
+        places = [ours_data.oMi[ours.getJointId(name)].translation for name in names]
+        np.testing.assert_allclose(places, data.xanchor[1:], atol=1e-8)
 
 
 def test_mjcf_gives_limits_torques_and_feet() -> None:
@@ -212,6 +215,7 @@ def test_mjcf_gives_limits_torques_and_feet() -> None:
     np.testing.assert_allclose(np.degrees(joints["FL_pitch"].limits), [-65, 195], atol=1e-5)
     efforts = [joints[f"FL_{name}"].effort for name in ("roll", "pitch", "knee")]
     assert efforts == pytest.approx([20.0, 27.0, 0.0])
+    assert [joints[f"FL_{name}"].velocity for name in ("roll", "pitch", "knee")] == [20, 20, 0]
     made = walking_proposal(urdf, "cat")
     robot = parse_robot(made.toml, made.urdf)
     assert robot.description.contact.sole == pytest.approx(0.02)

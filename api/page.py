@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import mimetypes
 import re
+from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Final
 
 from fastapi import Depends, FastAPI, Request, Response
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
+from starlette.types import Receive, Scope, Send
 
 from gaitswarm.api.documentation import policy_of
 from gaitswarm.api.problems import problem
@@ -74,6 +76,19 @@ def add_page(app: FastAPI, folder: Path) -> None:
     for path in ("/", *PAGES, *(f"{view}/{{rest:path}}" for view in PAGES)):
         app.add_route(path, page, include_in_schema=False)
     app.add_route("/assets/{name}", asset, include_in_schema=False)
+    not_found = app.router.default
+
+    async def default(scope: Scope, receive: Receive, send: Send) -> None:
+        request = Request(scope)
+        if request.headers.get("Accept", "").startswith("text/html") and is_built(folder):
+            # The page says that there is no such view.
+            response = page(request)
+            response.status_code = HTTPStatus.NOT_FOUND
+            await response(scope, receive, send)
+        else:
+            await not_found(scope, receive, send)
+
+    app.router.default = default
 
 
 def _file(folder: Path, name: str) -> Path | None:

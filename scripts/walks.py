@@ -1,5 +1,8 @@
 """Draw docs/images/walks.svg, a moving picture of two walks: python -m scripts.walks
 
+The lower walk alone, without words and colours, is web/src/jobs/walk.svg, which the page shows
+as long as there are no jobs.
+
 Above, the optimum that the thesis published under preference A; below, the controller and gait that
 the second job of `make demo` finds. Both in the scenario normal-fast, seen from the side and a
 little from above; the ground passes as fast as the robot walks.
@@ -8,6 +11,7 @@ little from above; the ground passes as fast as the robot walks.
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,6 +25,8 @@ from gaitswarm.replay import ReplayHeaderView, ReplayRequest, run_replay
 
 PICTURE: Final = Path(__file__).parents[1] / "docs" / "images" / "walks.svg"
 
+WALK: Final = Path(__file__).parents[1] / "web" / "src" / "jobs" / "walk.svg"
+
 _CONSTRAINT: Final = {"quantity": "*", "relative_to": "published:A", "max": 1.0}
 """No objective may be worse than that of the published optimum, in any scenario."""
 
@@ -29,8 +35,8 @@ _RATE: Final = 20.0
 _FROM, _TO = 1.5, 4.5
 """Part of the walk that is shown, after it has begun [s]."""
 
-_WIDTH, _ROW, _SCALE = 860, 210, 900.0
-"""Of the picture and of one walk in it [px], and of a metre [px]."""
+_WIDTH, _ROW, _LEFT, _SCALE = 860, 210, 262, 900.0
+"""Of the picture and of one walk in it, left end of the ground [px], and of a metre [px]."""
 
 _MARK: Final = 0.05
 """Between marks on the ground [m]."""
@@ -75,6 +81,17 @@ def main() -> None:
         f"<style>{_STYLE}</style>\n{''.join(rows)}</svg>\n",
         encoding="utf-8",
     )
+    WALK.write_text(walk_alone(PICTURE.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def walk_alone(picture: str) -> str:
+    """The second walk of the picture, cut to the robot and its ground."""
+    second = picture[picture.rindex("<g transform=") :]
+    moving = re.sub(r"<text.*?</text>\n|<g transform[^>]*>\n", "", second).replace(
+        "</g>\n</svg>", "</svg>"
+    )
+    box = f"{_LEFT} 0 {_WIDTH - _LEFT} {_ROW}"
+    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{box}">\n{moving}'
 
 
 def _replay(design: Mapping[str, float | str]) -> tuple[ReplayHeaderView, dict[str, Points]]:
@@ -153,7 +170,7 @@ def _screen(points: Points) -> Points:
 
 def _ground(moved: Points, seconds: float) -> str:
     """Marks that pass; they restart with the walk."""
-    left, right = 262.0, _WIDTH - 16.0
+    left, right = float(_LEFT), _WIDTH - 16.0
     count = int((right - left) / _SCALE / _MARK + (moved[-1] - moved[0]) / _MARK) + 2
     (far, near) = (_screen(np.array([0.0, side * _STRIP, 0.0])) for side in (1.0, -1.0))
     line = f"l{near[0] - far[0]:.0f} {near[1] - far[1]:.0f}"

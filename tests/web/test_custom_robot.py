@@ -17,6 +17,7 @@ from tests.examples.paths import QUADRUPED
 from tests.examples.servers import ServerProcess
 from tests.robots.test_proposal import dog
 from tests.web.pixels import painted
+from tests.web.test_job import open_advanced
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -86,11 +87,15 @@ def test_a_urdf_is_simulated_and_submitted(
         return tmp_path / name
 
     page = visit(server.url, allowed="422").go("/jobs/new")
-    page.get_by_role("link", name="a custom robot").click()
+    page.get_by_role("button", name="My robot").click()
+    # Nothing is refused before there is a robot.
+    expect(page.get_by_role("button", name="Submit the job")).to_be_disabled()
+    expect(page.get_by_role("alert")).to_have_count(0)
     urdf = page.get_by_label("URDF, xacro or MJCF")
     urdf.set_input_files(file("broken.urdf", dog().replace("-2.7", "-120")))
     error = page.get_by_role("alert").filter(has_text="Could not create a robot from broken.urdf.")
     expect(error).to_contain_text(re.compile("urdf: .*line .*in degrees"))
+    expect(page.get_by_text("in degrees")).to_have_count(1)
 
     urdf.set_input_files(file("dog.urdf", dog(foot="cylinder")))
     results = page.get_by_role("region", name="Check results")
@@ -103,6 +108,7 @@ def test_a_urdf_is_simulated_and_submitted(
     expect(start.locator("[data-ended='ok']")).to_be_visible()
     expect(start.get_by_role("img", name="Replay of the preview design")).to_be_visible()
 
+    page.get_by_text("robot.toml: settings missing in the URDF").click()
     toml = page.get_by_label("Text of robot.toml")
     proposed = toml.input_value()
     toml.fill(proposed.replace("load_height", "load_hight"))
@@ -115,6 +121,7 @@ def test_a_urdf_is_simulated_and_submitted(
     expect(results).to_be_visible()
 
     slow = page.locator("[data-custom='0']")
+    slow.get_by_text("slow", exact=True).click()
     drop = slow.get_by_label(re.compile("^drop"))
     expect(drop).to_be_hidden()
     slow.get_by_text(re.compile("more settings, all at their defaults")).click()
@@ -122,6 +129,7 @@ def test_a_urdf_is_simulated_and_submitted(
     drop.fill("")
     expect(drop).to_be_visible()
 
+    open_advanced(page)
     page.get_by_label("Particles").fill("2")
     page.get_by_label("Iterations").fill("1")
     expect(page.locator("[data-walks='4']")).to_be_visible()

@@ -185,8 +185,9 @@ def test_parameters_of_a_custom_robot_are_those_of_its_legs(
     # Six legs with a foot and three gearheads each, battery and body.
     parameters = page.locator("summary").filter(has_text="Parameters:")
     expect(parameters).to_have_text("Parameters: 45 of 45 fitted")
-    page.get_by_role("button", name="custom", exact=True).first.click()
-    page.get_by_label("URDF").set_input_files(QUADRUPED / "robot.urdf")
+    page.get_by_role("button", name="My robot", exact=True).click()
+    page.get_by_text("Actuators, robot.toml and job.json").click()
+    page.get_by_label("URDF, xacro or MJCF").set_input_files(QUADRUPED / "robot.urdf")
     page.get_by_label("robot.toml").set_input_files(QUADRUPED / "robot.toml")
     toml, urdf = (
         (QUADRUPED / name).read_text(encoding="utf-8") for name in ("robot.toml", "robot.urdf")

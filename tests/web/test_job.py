@@ -27,10 +27,15 @@ OTHER_SCENARIOS = ("normal-slow", "loaded-fast", "loaded-slow", "slope-fast", "t
 def fill_in(page: Page, name: str, *, iterations: int) -> None:
     """Fill in the form of a job with one scenario and eight particles."""
     page.get_by_label("Name", exact=True).fill(name)
+    open_advanced(page)
     page.get_by_label(re.compile("^Iterations")).fill(str(iterations))
     page.get_by_label(re.compile("^particles", re.IGNORECASE)).fill("8")
     for scenario in OTHER_SCENARIOS:
         page.get_by_label(re.compile(f"^[1-6] {scenario}$")).uncheck()
+
+
+def open_advanced(page: Page) -> None:
+    page.get_by_text(re.compile("^Advanced:")).click()
 
 
 def submitted(page: Page) -> str:
@@ -168,8 +173,8 @@ def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/jobs/new")
-    expect(page.get_by_label("Precision")).to_have_value("double")
     fill_in(page, "in single", iterations=2)
+    expect(page.get_by_label("Precision")).to_have_value("double")
     page.get_by_label("Precision").select_option("single")
     page.get_by_role("button", name="Submit the job").click()
 
@@ -336,7 +341,8 @@ def test_the_form_offers_robots_and_collapses_conventions(
     picker = page.get_by_label("Shipped robot")
     expect(picker.locator("option")).to_have_text(robots)
     expect(picker).to_have_value(robots[0])
-    conventions = page.locator("details").filter(has_text="Conventions")
+    open_advanced(page)
+    conventions = page.locator("details").filter(has_text="Conventions").last
     expect(conventions.locator("table")).to_be_hidden()
     conventions.locator("summary").click()
     expect(conventions.locator("table")).to_be_visible()

@@ -134,6 +134,7 @@ def test_a_webhook_is_set_in_the_form_unless_its_host_is_not_allowed(
 ) -> None:
     server = start_server(webhook_hosts="ci.example")
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
+    page.get_by_text("Priority and webhook").click()
     webhook = page.get_by_label("Webhook")
     webhook.fill("https://elsewhere.example/hook")
     click_button(page, "Submit the job")
@@ -154,6 +155,7 @@ def test_the_priority_is_set_in_the_form_and_changed_on_the_page(
 ) -> None:
     server = start_server()
     page = visit(server.url).go("/jobs/new")
+    page.get_by_text("Priority and webhook").click()
     page.get_by_label(re.compile("^Priority")).fill("3")
     click_button(page, "Submit the job")
     expect(page).to_have_url(SUBMITTED)

@@ -11,6 +11,7 @@ from playwright.sync_api import Page, expect
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import choose
+from tests.web.test_certificate import CERTIFICATE
 from tests.web.visit import Visit, show_tab_again
 
 pytestmark = pytest.mark.slow
@@ -119,6 +120,19 @@ def test_selected_jobs_are_compared(
     page.get_by_role("link", name="Compare").click()
     expect(page).to_have_url(re.compile(f"/compare.jobs={two_jobs[0]},{two_jobs[1]}$"))
     expect(page.locator("[data-compared]")).to_have_count(2)
+    outcomes = page.get_by_role("table", name="Outcomes of the jobs")
+    jobs = [server.job(job_id) for job_id in two_jobs]
+    loaded = [job["best"]["scenarios"]["loaded"]["objectives"] for job in jobs]
+    page.get_by_label("Scenario").select_option("loaded")
+    energies = outcomes.locator("[data-quantity='energy'] td")
+    expect(energies.nth(0)).to_contain_text(f"{loaded[0]['energy']:.3g}")
+    winner = min((0, 1), key=lambda k: loaded[k]["energy"])
+    expect(energies.nth(winner).locator("[data-best]")).to_be_visible()
+    fastest = min((0, 1), key=lambda k: loaded[k]["reciprocal_speed"])
+    speeds = outcomes.locator("[data-quantity='speed'] td")
+    expect(speeds.nth(fastest).locator("[data-best]")).to_be_visible()
+    page.get_by_role("button", name="Simulate the walks").click()
+    expect(page.locator("[data-walk] canvas")).to_have_count(2)
     differences = page.get_by_role("table", name="Differences between specs")
     fields = differences.get_by_role("rowheader")
     expect(fields).to_have_text(["iterations", "seed"])
@@ -137,7 +151,7 @@ def test_selected_jobs_are_compared(
     page.goto(with_zoom)
     expect(plot).to_have_attribute("data-range", "1 2")
     expect(page.get_by_label("logarithmic")).not_to_be_checked()
-    page.get_by_role("main").get_by_role("combobox").select_option("seconds")
+    page.get_by_label(re.compile("^By")).select_option("seconds")
     expect(page).to_have_url(re.compile("by=seconds"))
     expect(
         page.get_by_role("img", name="Convergence of 2 jobs by time of evaluation")
@@ -174,7 +188,7 @@ def test_errors_of_a_comparison_are_shown(
     page = visit(server.url).go("/compare")
     expect(page.get_by_role("heading", name="No jobs selected")).to_be_visible()
     page = visit(server.url, allowed="status of 404").go("/compare?jobs=aaaaaaaaaaaa")
-    expect(page.get_by_role("alert")).to_contain_text("Could not compare the jobs.")
+    expect(page.get_by_role("heading", name="None of these jobs exists")).to_be_visible()
 
 
 def test_a_job_is_labelled_and_archived(
@@ -203,3 +217,58 @@ def test_a_job_is_labelled_and_archived(
     assert rows(page) == [other]
     page.get_by_label("archived", exact=True).check()
     expect(row).to_be_visible()
+
+
+def test_a_thousand_jobs_are_selected_and_the_first_twelve_compared(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    for k in range(53):
+        server.submit(SMALL_JOB | {"name": f"job {k}"})
+    page = visit(server.url).go("/jobs")
+    page.get_by_label("Select the jobs of this page").check()
+    expect(page.locator("[data-selected-jobs='50']")).to_be_visible()
+    page.get_by_role("button", name="Select all pages").click()
+    expect(page.locator("[data-selected-jobs='53']")).to_be_visible()
+    page.reload()
+    expect(page.locator("[data-selected-jobs='53']")).to_be_visible()
+    page.get_by_role("link", name="Compare the first 12").click()
+    expect(page.locator("[data-compared]")).to_have_count(12)
+
+
+def test_archiving_can_be_undone(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    job_id, _ = server.submit(SMALL_JOB), server.submit(SMALL_JOB | {"name": "other"})
+    page = visit(server.url).go("/jobs")
+    page.locator(f"[data-job='{job_id}']").get_by_role("checkbox").check()
+    page.get_by_role("button", name="Archive").click()
+    expect(page.locator("[data-job]")).to_have_count(1)
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator("[data-job]")).to_have_count(2)
+
+
+def test_only_searches_are_sorted_by_fitness(
+    server: ServerProcess, two_jobs: tuple[str, str], visit: Callable[..., Visit]
+) -> None:
+    server.submit(CERTIFICATE)
+    page = visit(server.url).go("/jobs")
+    expect(page.get_by_text("certificate").first).to_be_visible()
+    page.get_by_label("Order").select_option("fitness")
+    expect(page.get_by_text("certificate")).to_have_count(0)
+    assert set(two_jobs) <= set(rows(page))
+
+
+def test_a_deleted_job_and_jobs_of_other_kinds_do_not_end_a_comparison(
+    server: ServerProcess, two_jobs: tuple[str, str], visit: Callable[..., Visit]
+) -> None:
+    certificate = server.submit(CERTIFICATE)
+    ids = ",".join((*two_jobs, "aaaaaaaaaaaa", certificate))
+    page = visit(server.url, allowed="status of 404").go(f"/compare?jobs={ids}")
+    expect(page.get_by_text("Not found, perhaps deleted: aaaaaaaaaaaa.")).to_be_visible()
+    expect(page.locator("[data-compared]")).to_have_count(3)
+    expect(page.get_by_role("table", name="Outcomes").get_by_role("columnheader")).to_have_count(3)
+    expect(page.get_by_role("img", name=re.compile("^Convergence of 2 jobs"))).to_be_visible()
+    header = page.get_by_role("columnheader", name="Best fitness")
+    expect(header.get_by_role("button")).to_have_count(0)

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, ViewportSize, expect
 
 from tests.examples.paths import ROOT
-from tests.examples.servers import Server, ServerProcess
+from tests.examples.servers import ServerProcess
 from tests.web.job_page import choose
 from tests.web.views import VIEWS, open_view
 from tests.web.visit import Visit
@@ -167,13 +167,3 @@ def test_the_api_documentation_complies_with_its_content_security_policy(
     page = visit(server.url).go("/docs")
 
     expect(page.get_by_role("heading", name="gaitswarm").first).to_be_visible()
-
-
-def test_an_empty_list_explains_the_next_step(
-    start_server: Callable[..., Server], visit: Callable[..., Visit]
-) -> None:
-    page = visit(start_server().url).go("/")
-
-    expect(page.get_by_role("heading", name="No jobs yet")).to_be_visible()
-    page.get_by_role("link", name="Create the first job").click()
-    expect(page.get_by_role("heading", name="New job")).to_be_visible()

@@ -36,7 +36,7 @@ def test_the_preference_of_chapter_3_weights_a_sixth_objective(
         "data-winner", f"{winner['iteration']}.{winner['particle']}"
     )
     page.get_by_role("link", name="Start a job from here").click()
-    chosen = page.get_by_role("button", name="chapter-3", exact=True)
+    chosen = page.get_by_role("button", name="chapter-3 · speed")
     expect(chosen).to_have_attribute("aria-pressed", "true")
     page.get_by_role("button", name="pso-falling-inertia", exact=True).click()
     page.get_by_label("Name", exact=True).fill("as in chapter 3")

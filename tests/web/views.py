@@ -45,6 +45,7 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
     "missing": {
         "no-such-job": "/jobs/none",
         "no-such-page": "/walk/none",
+        "no-such-path": "/nosuch",
     },
 }
 """Paths by group and name; {job} is a succeeded job."""

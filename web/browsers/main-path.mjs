@@ -43,6 +43,7 @@ async function mainPath(page) {
   await page.until('the form', () => document.querySelector('[data-walks]') !== null)
   await checkWidths(page, 'form')
   await page.fill('Name', 'in Firefox')
+  await page.click('summary', 'Advanced')
   await page.fill('Iterations', '12')
   await page.fill('Particles', '8')
   for (const scenario of OTHER_SCENARIOS) await page.click('label', scenario)

@@ -12,6 +12,7 @@ import { referenceLabel } from '../job/gain'
 import { fittedRange } from '../job/result/model'
 import { setQuery } from '../router/navigation'
 import { flag, oneOf, useQueryValue } from '../router/query-value'
+import { jobPath } from '../router/routes'
 
 export type ComparedJob = JobComparison['jobs'][number]
 
@@ -147,6 +148,20 @@ export function referencesOf(jobs: readonly ComparedJob[]): readonly ReferenceLi
     references.set(`${label} ${reference.fitness}`, { label, fitness: reference.fitness })
   }
   return [...references.values()]
+}
+
+/** A job's link, with the colour of its lines. */
+export function JobName({ job, index }: { job: Pick<ComparedJob, 'id' | 'name'>; index: number }) {
+  return (
+    <span class="nowrap">
+      <i
+        class="compared-mark"
+        style={{ background: `var(${colourOf(index)})` }}
+        aria-hidden="true"
+      />
+      <a href={jobPath(job.id)}>{job.name || job.id}</a>
+    </span>
+  )
 }
 
 const COLOURS = [1, 2, 3, 4, 5, 6].map((k) => `--series-${k}` as const)

@@ -1,39 +1,66 @@
-/** Comparison of jobs: convergence, distribution of fitness, differences between specs. */
+/** Comparison of jobs: outcomes, walks, convergence, differences between specs. */
 
 import { get } from '../api/client'
+import { ApiProblem } from '../api/problem'
 import { usePolling, useResource } from '../api/resource'
-import type { JobComparison } from '../api/types'
+import type { Job, JobComparison, StoredJob } from '../api/types'
 import { Card, EmptyCard, Loaded } from '../components/card'
 import { Empty } from '../components/feedback'
 import { StateBadge } from '../components/state'
 import { Table } from '../components/table/table'
-import { formatCount, NONE, percent } from '../format/number'
-import { isActive } from '../job/facts'
+import { formatCount, NONE, percent, quantity } from '../format/number'
+import { inWords } from '../format/words'
+import { fitnessUnit, isActive } from '../job/facts'
+import { MOST_COMPARED } from '../jobs/list-query'
 import { ALL_JOBS, Breadcrumbs } from '../router/breadcrumbs'
 import { usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
-import { jobPath } from '../router/routes'
-import { type ComparedJob, ConvergenceCard, colourOf, DistributionCard } from './charts'
+import { type ComparedJob, ConvergenceCard, DistributionCard, JobName } from './charts'
+import { Outcomes } from './outcomes'
+import { specWords } from './spec-words'
 import './compare.css'
 
 /** Polling interval while a job is active [ms]. */
 const RENEW_MS = 4000
 const NAMED = 3
 
+interface Compared {
+  readonly jobs: readonly StoredJob[]
+  /** Ids of deleted jobs. */
+  readonly missing: readonly string[]
+  readonly comparison: JobComparison | null
+}
+
+async function load(ids: readonly string[], signal: AbortSignal): Promise<Compared> {
+  const loaded = await Promise.all(
+    ids.map((id) =>
+      get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }).catch((error: unknown) => {
+        if (error instanceof ApiProblem && error.status === 404) return null
+        throw error
+      }),
+    ),
+  )
+  const jobs = loaded.filter((job) => job !== null)
+  const missing = ids.filter((_, k) => loaded[k] === null)
+  const [first, ...also] = jobs.map(({ id }) => id)
+  if (first === undefined) return { jobs, missing, comparison: null }
+  const path = { job_id: first }
+  const comparison = await get('/v1/jobs/{job_id}/comparison', { path, query: { also }, signal })
+  return { jobs, missing, comparison }
+}
+
 export default function ComparePage() {
   const { query } = usePlace()
-  const ids = idsOf(query.get('jobs'))
-  const [first, ...also] = ids
-  const comparison = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
-    get('/v1/jobs/{job_id}/comparison', { path: { job_id: first }, query: { also }, signal }),
-  )
-  usePolling(comparison.reload, RENEW_MS, comparison.data?.jobs.some(isActive) ?? false)
+  const ids = idsOf(query.get('jobs')).slice(0, MOST_COMPARED)
+  const compared = useResource(ids.length === 0 ? null : ids.join(), (signal) => load(ids, signal))
+  usePolling(compared.reload, RENEW_MS, compared.data?.jobs.some(isActive) ?? false)
+  const comparison = compared.data?.comparison
   return (
     <>
       <Breadcrumbs
         crumbs={[ALL_JOBS]}
         here="Compared jobs"
-        title={comparison.data ? titleOf(comparison.data.jobs) : undefined}
+        title={comparison ? titleOf(comparison.jobs) : undefined}
       />
       <header class="page-header">
         <h1>Compared jobs</h1>
@@ -46,8 +73,29 @@ export default function ComparePage() {
             </p>
           </EmptyCard>
         )}
-        <Loaded resource={comparison} what="the jobs" failed="Could not compare the jobs.">
-          {(data) => <Comparison comparison={data} />}
+        <Loaded resource={compared} what="the jobs" failed="Could not compare the jobs.">
+          {(data) => (
+            <>
+              {data.missing.length > 0 && (
+                <div class="notice" data-tone="warn" role="status">
+                  <p>Not found, perhaps deleted: {data.missing.join(', ')}.</p>
+                </div>
+              )}
+              {data.comparison ? (
+                <Comparison
+                  comparison={data.comparison}
+                  jobs={data.jobs}
+                  scenario={query.get('scenario') ?? ''}
+                />
+              ) : (
+                <EmptyCard title="None of these jobs exists">
+                  <p>
+                    Select others in the <a href="/jobs">list of jobs</a>.
+                  </p>
+                </EmptyCard>
+              )}
+            </>
+          )}
         </Loaded>
       </div>
     </>
@@ -61,15 +109,30 @@ function titleOf(jobs: readonly ComparedJob[]): readonly string[] {
   return [names.join(', '), ...(running > 0 ? [`${running} running`] : []), 'compared']
 }
 
-function Comparison({ comparison }: { comparison: JobComparison }) {
+interface ComparisonProps {
+  comparison: JobComparison
+  jobs: readonly StoredJob[]
+  scenario: string
+}
+
+function Comparison({ comparison, jobs, scenario }: ComparisonProps) {
+  const stored = new Map(jobs.map((job) => [job.id, job]))
+  const kinds = new Set(jobs.map(({ kind }) => kind))
+  const tuned = comparison.jobs.filter(({ id }) => stored.get(id)?.kind === 'tuning')
+  // Kinds have no common scale.
+  const charted = kinds.size > 1 ? tuned : comparison.jobs
   return (
     <>
       {!comparison.comparable && (
         <div class="notice" data-tone="warn" role="status" data-comparable="false">
           <strong>These jobs measure fitness differently.</strong>
-          <p>Their fitness values are not comparable: see the differences between their specs.</p>
+          <p>
+            Their fitness values are not comparable; compare their outcomes.
+            {kinds.size > 1 && ' Charts show searches only.'}
+          </p>
         </div>
       )}
+      <Outcomes jobs={jobs.filter(({ kind }) => kind === 'tuning') as Job[]} scenario={scenario} />
       <Card title="The jobs">
         <Table
           caption="Compared jobs"
@@ -80,23 +143,24 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
               key: 'job',
               header: true,
               value: ({ name, id }) => name || id,
-              cell: (job) => (
-                <>
-                  <i
-                    class="compared-mark"
-                    style={{ background: `var(${colourOf(comparison.jobs.indexOf(job))})` }}
-                    aria-hidden="true"
-                  />
-                  <a href={jobPath(job.id)}>{job.name || job.id}</a>
-                </>
-              ),
+              cell: (job) => <JobName job={job} index={comparison.jobs.indexOf(job)} />,
             },
             {
               key: 'state',
               value: ({ state }) => state,
               cell: ({ state }) => <StateBadge state={state} />,
             },
-            { key: 'best fitness', digits: 5, value: ({ best_fitness }) => best_fitness },
+            ...(kinds.size > 1
+              ? [{ key: 'kind', cell: ({ id }: ComparedJob) => stored.get(id)?.kind }]
+              : []),
+            {
+              key: 'best fitness',
+              numeric: true,
+              // Sortable only if it is one quantity.
+              value: comparison.comparable ? ({ best_fitness }) => best_fitness : undefined,
+              cell: ({ id, best_fitness }) =>
+                quantity(best_fitness, fitnessUnit(stored.get(id)!), 5),
+            },
             {
               key: 'gain',
               numeric: true,
@@ -122,9 +186,13 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
           ]}
         />
       </Card>
-      <ConvergenceCard jobs={comparison.jobs} comparable={comparison.comparable} />
-      <DistributionCard jobs={comparison.jobs} />
       <Differences comparison={comparison} />
+      {charted.length > 0 && (
+        <>
+          <ConvergenceCard jobs={charted} comparable={comparison.comparable} />
+          <DistributionCard jobs={charted} />
+        </>
+      )}
     </>
   )
 }
@@ -145,13 +213,14 @@ function Differences({ comparison: { jobs, differences } }: { comparison: JobCom
               key: 'field',
               header: true,
               value: ({ field }) => field,
-              cell: ({ field }) => <code>{field}</code>,
+              cell: ({ field }) => inWords(field).replaceAll('.', ' › '),
             },
-            ...jobs.map(({ id, name }, k) => ({
-              key: id,
-              label: name || id,
+            ...jobs.map((job, k) => ({
+              key: job.id,
+              heading: <JobName job={job} index={k} />,
+              label: job.name || job.id,
               cell: ({ values }: JobComparison['differences'][number]) => (
-                <code class="spec-value">{values[k] ?? NONE}</code>
+                <span class="spec-value">{specWords(values[k])}</span>
               ),
             })),
           ]}

@@ -10,26 +10,40 @@ import { referenceLabel } from '../job/gain'
 import { jobPath } from '../router/routes'
 import { Sparkline, type Sparklines } from './sparkline'
 
-interface Shared {
+interface Listed {
   readonly lines: Sparklines
   readonly selected: readonly string[]
-  readonly onSelect: (id: string, on: boolean) => void
+  readonly onSelect: (ids: readonly string[]) => void
+  readonly jobs: readonly JobSummary[]
 }
 
 /** Columns sorted by the server. now: [ms], for ages. */
 export function jobColumns(
   now: number,
-  { lines, selected, onSelect }: Shared,
+  { lines, selected, onSelect, jobs }: Listed,
 ): readonly Column<JobSummary>[] {
+  const chosen = new Set(selected)
+  const all = jobs.every(({ id }) => chosen.has(id))
+  const others = selected.filter((id) => !jobs.some((job) => job.id === id))
   return [
     {
       key: 'select',
+      heading: (
+        <input
+          type="checkbox"
+          aria-label="Select the jobs of this page"
+          checked={all}
+          onChange={() => onSelect(all ? others : [...others, ...jobs.map(({ id }) => id)])}
+        />
+      ),
       cell: ({ id, name }) => (
         <input
           type="checkbox"
           aria-label={`Select ${name || id}`}
-          checked={selected.includes(id)}
-          onChange={(event) => onSelect(id, event.currentTarget.checked)}
+          checked={chosen.has(id)}
+          onChange={() =>
+            onSelect(chosen.has(id) ? selected.filter((each) => each !== id) : [...selected, id])
+          }
         />
       ),
     },

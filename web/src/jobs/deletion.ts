@@ -77,7 +77,10 @@ export async function deleteAll(
 }
 
 /** Map over the items with limited concurrency, preserving their order. */
-async function inTurn<T, R>(items: readonly T[], work: (item: T) => Promise<R>): Promise<R[]> {
+export async function inTurn<T, R>(
+  items: readonly T[],
+  work: (item: T) => Promise<R>,
+): Promise<R[]> {
   const results: R[] = []
   for (let begin = 0; begin < items.length; begin += AT_ONCE) {
     results.push(...(await Promise.all(items.slice(begin, begin + AT_ONCE).map(work))))

@@ -14,7 +14,7 @@ export const STATES: readonly JobState[] = [
 
 export const ORDERS = {
   created: 'newest first',
-  fitness: 'best first',
+  fitness: 'best searches first',
   gain: 'greatest gain first',
   name: 'by name',
   state: 'by state',
@@ -28,6 +28,8 @@ export const ORDERS = {
 export type Order = keyof typeof ORDERS
 
 export const PAGE = 50
+
+export const MOST_COMPARED = 12
 
 /** Filters in the order in which they are offered. */
 export const FACETS = ['state', 'robot', 'controller', 'preference', 'tag'] as const
@@ -63,6 +65,8 @@ export function listQuery(query: URLSearchParams) {
     preference: text('preference'),
     tag: text('tag'),
     archived: query.has('archived'),
+    // The fitness of other kinds is another quantity.
+    kind: order === 'fitness' || order === 'gain' ? ('tuning' as const) : undefined,
     order: order in ORDERS ? (order as Order) : 'created',
     reverse: query.has('reverse'),
   }
@@ -71,5 +75,8 @@ export function listQuery(query: URLSearchParams) {
 export const FIRST_PAGE = { after: null } as const
 
 export function isFiltered(query: ListQuery): boolean {
-  return query.search !== undefined || FACETS.some((facet) => query[facet] !== undefined)
+  const { search, kind } = query
+  return (
+    search !== undefined || kind !== undefined || FACETS.some((facet) => query[facet] !== undefined)
+  )
 }

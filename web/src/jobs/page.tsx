@@ -3,17 +3,17 @@
 import type { ComponentChildren } from 'preact'
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
+import { ApiProblem } from '../api/problem'
 import { useNow, usePolling, useResource } from '../api/resource'
 import type { JobFacets, JobState, JobSummary } from '../api/types'
-import { EmptyCard } from '../components/card'
-import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { Check, Select } from '../components/fields/controls'
 import { Pager, Table } from '../components/table/table'
 import { formatCount } from '../format/number'
 import { capitalized } from '../format/words'
+import { lazyPage } from '../router/lazy-page'
 import { setQuery, usePlace } from '../router/navigation'
-import { idsOf } from '../router/query-value'
+import { ignore } from '../router/query-value'
 import { jobColumns } from './columns'
 import {
   descends,
@@ -29,9 +29,11 @@ import {
   reordered,
   STATES,
 } from './list-query'
-import { jobsInWords, Selection } from './selection'
+import { jobsInWords, Selection, useSelected } from './selection'
 import { useSparklines } from './sparkline'
 import './jobs.css'
+
+const FirstRun = lazyPage('the first view', () => import('./first-run'))
 
 export function JobsPage() {
   const place = usePlace()
@@ -39,18 +41,23 @@ export function JobsPage() {
   // Cursors of the previous pages, so that Previous, Back and reload work.
   const cursors = place.query.getAll('after')
   const setCursors = (after: readonly string[]) => setQuery({ after }, { replace: false })
-  const selected = idsOf(place.query.get('selected'))
-  const setSelected = (ids: readonly string[]) => setQuery({ selected: ids.join() || null })
+  const [selected, setSelected] = useSelected()
+  const [beginning, setBeginning] = useState(false)
   const { page, error, announcement, reload } = useList(query, cursors.at(-1) ?? null)
   const facets = useFacets(query.archived)
   const now = useNow(1000)
   const lines = useSparklines(page?.items ?? [])
   const jobs = page?.items ?? null
-  const toggle = (id: string, on: boolean) =>
-    setSelected(on ? [...selected, id] : selected.filter((each) => each !== id))
+  const wrongCursor = error instanceof ApiProblem && error.errors[0]?.field === 'after'
+  useEffect(() => {
+    if (!wrongCursor) return
+    ignore('after', cursors.at(-1) ?? '')
+    setQuery(FIRST_PAGE)
+  }, [wrongCursor])
   const filtered = isFiltered(query)
   const none = jobs?.length === 0 && cursors.length === 0
   const empty = none && !filtered && !query.archived
+  if (empty || beginning) return <FirstRun onBegin={setBeginning} />
   return (
     <>
       <header class="page-header">
@@ -60,22 +67,22 @@ export function JobsPage() {
         </a>
       </header>
       <div class="stack">
-        {error !== null && (
+        {error !== null && !wrongCursor && (
           <ErrorNotice
             what={jobs ? 'The list is out of date.' : 'Could not load the jobs.'}
             error={error}
           />
         )}
         {jobs === null && error === null && <Loading what="jobs" />}
-        {empty && <NoJobs />}
-        {page !== null && jobs !== null && !empty && (
+        {page !== null && jobs !== null && (
           <section class="card" aria-label="List of jobs">
             <Filters query={query} facets={facets}>
               {countWords(facets, filtered, jobs.length, page.next, cursors.length)}
             </Filters>
             <Selection
               selected={selected}
-              archived={query.archived}
+              query={query}
+              more={cursors.length > 0 || page.next !== null}
               onDone={reload}
               onSelect={setSelected}
             />
@@ -87,8 +94,9 @@ export function JobsPage() {
               </Empty>
             ) : (
               <Table
+                cards
                 caption="Jobs"
-                columns={jobColumns(now, { lines, selected, onSelect: toggle })}
+                columns={jobColumns(now, { lines, selected, onSelect: setSelected, jobs })}
                 rows={jobs}
                 rowKey={(job) => job.id}
                 external={{
@@ -130,24 +138,6 @@ function countWords(
   if (!filtered && facets) return jobsInWords(facets.total)
   if (next === null) return jobsInWords(earlier * PAGE + shown)
   return `more than ${formatCount((earlier + 1) * PAGE)} jobs`
-}
-
-function NoJobs() {
-  return (
-    <EmptyCard title="No jobs yet">
-      <p>A job searches for the controller that performs best in all of its scenarios.</p>
-      <p>
-        <a class="button primary" href="/jobs/new">
-          Create the first job
-        </a>
-      </p>
-      <p>or run the job of the thesis’s chapter 4 in a terminal:</p>
-      <CopyBlock
-        label="the command"
-        text={`echo '{"name": "chapter 4"}' > job.json\ngaitswarm submit --spec job.json --server ${location.origin}`}
-      />
-    </EmptyCard>
-  )
 }
 
 const POLL_MS = 2000
@@ -193,6 +183,7 @@ const NO_FILTER: Readonly<Record<string, null>> = {
   ...FIRST_PAGE,
   search: null,
   archived: null,
+  order: null,
   ...Object.fromEntries(FACETS.map((facet) => [facet, null])),
 }
 

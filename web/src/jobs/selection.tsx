@@ -1,43 +1,72 @@
-/** Commands for the selected jobs: compare, archive, delete. */
+/** Selected jobs, and commands for them: compare, archive, delete. */
 
 import { useState } from 'preact/hooks'
-import { patch, remove } from '../api/client'
+import { get, patch, remove } from '../api/client'
 import type { JobSummary } from '../api/types'
 import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
+import { idsOf } from '../router/query-value'
 import { comparePath, jobPath } from '../router/routes'
 import {
   type Deletion,
   type DeletionPreview,
   deleteAll,
   deletionPreview,
+  inTurn,
   lostWith,
 } from './deletion'
+import { type ListQuery, MOST_COMPARED } from './list-query'
 
-const MOST_COMPARED = 12
+const KEY = 'gaitswarm.selected'
+
+/** Ids kept until the tab is closed: an address cannot hold a thousand. */
+export function useSelected() {
+  const [ids, setIds] = useState<readonly string[]>(() => idsOf(sessionStorage.getItem(KEY)))
+  const select = (next: readonly string[]) => {
+    sessionStorage.setItem(KEY, next.join())
+    setIds(next)
+  }
+  return [ids, select] as const
+}
+
+/** Jobs in a page of a long list. */
+const LARGE_PAGE = 200
+
+async function allIds(query: ListQuery): Promise<readonly string[]> {
+  const ids: string[] = []
+  for (let after: string | undefined, more = true; more; ) {
+    const page = await get('/v1/jobs', { query: { ...query, after, limit: LARGE_PAGE } })
+    ids.push(...page.items.map(({ id }) => id))
+    more = page.next !== null
+    after = page.next ?? undefined
+  }
+  return ids
+}
 
 interface SelectionProps {
   selected: readonly string[]
-  archived: boolean
+  query: ListQuery
+  /** Whether there are jobs on other pages. */
+  more: boolean
   onDone: () => void
   onSelect: (selected: readonly string[]) => void
 }
 
-export function Selection({ selected, archived, onDone, onSelect }: SelectionProps) {
+export function Selection({ selected, query, more, onDone, onSelect }: SelectionProps) {
   const [error, setError] = useState<unknown>(null)
   const [preview, setPreview] = useState<DeletionPreview | null>(null)
   const [deletion, setDeletion] = useState<Deletion | null>(null)
+  const [moved, setMoved] = useState<{ ids: readonly string[]; archived: boolean } | null>(null)
   const [busy, setBusy] = useState(false)
   const during = (work: Promise<void>) => {
     setError(null)
     setBusy(true)
     work.catch(setError).finally(() => setBusy(false))
   }
-  const archive = async () => {
-    const body = { archived: !archived }
-    await Promise.all(
-      selected.map((id) => patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })),
+  const archive = async (ids: readonly string[], archived: boolean) => {
+    await inTurn(ids, (id) =>
+      patch('/v1/jobs/{job_id}', { path: { job_id: id }, body: { archived } }),
     )
     onSelect([])
     onDone()
@@ -57,15 +86,32 @@ export function Selection({ selected, archived, onDone, onSelect }: SelectionPro
       {selected.length > 0 && (
         <div class="row selection" data-selected-jobs={selected.length}>
           <strong aria-live="polite">{formatCount(selected.length)} selected</strong>
-          {selected.length <= MOST_COMPARED ? (
-            <a class="button compact" href={comparePath(selected)}>
-              Compare
-            </a>
-          ) : (
-            <span class="muted small">at most {MOST_COMPARED} can be compared</span>
+          {more && (
+            <button
+              type="button"
+              class="compact"
+              disabled={busy}
+              onClick={() => during(allIds(query).then(onSelect))}
+            >
+              Select all pages
+            </button>
           )}
-          <button type="button" class="compact" disabled={busy} onClick={() => during(archive())}>
-            {archived ? 'Restore from archive' : 'Archive'}
+          <a class="button compact" href={comparePath(selected.slice(0, MOST_COMPARED))}>
+            Compare{selected.length > MOST_COMPARED && ` the first ${MOST_COMPARED}`}
+          </a>
+          <button
+            type="button"
+            class="compact"
+            disabled={busy}
+            onClick={() =>
+              during(
+                archive(selected, !query.archived).then(() =>
+                  setMoved({ ids: selected, archived: !query.archived }),
+                ),
+              )
+            }
+          >
+            {query.archived ? 'Restore from archive' : 'Archive'}
           </button>
           <button
             type="button"
@@ -81,6 +127,24 @@ export function Selection({ selected, archived, onDone, onSelect }: SelectionPro
         </div>
       )}
       {error !== null && <ErrorNotice what="The command failed." error={error} />}
+      {moved && (
+        <div class="notice row" data-tone="good" role="status">
+          <span>
+            {jobsInWords(moved.ids.length)} {moved.archived ? 'archived' : 'restored'}.
+          </span>
+          <button
+            type="button"
+            class="compact"
+            disabled={busy}
+            onClick={() => during(archive(moved.ids, !moved.archived).then(() => setMoved(null)))}
+          >
+            Undo
+          </button>
+          <button type="button" class="compact plain" onClick={() => setMoved(null)}>
+            Close
+          </button>
+        </div>
+      )}
       {deletion !== null && <DeletionNote deletion={deletion} onClose={() => setDeletion(null)} />}
       {preview && (
         <ConfirmDialog

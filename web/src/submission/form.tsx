@@ -1,6 +1,6 @@
 /** New-job form, with its estimate and its spec as JSON. */
 
-import { useMemo, useState } from 'preact/hooks'
+import { useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
 import { jobSearch } from '../api/jobs'
 import { ApiProblem } from '../api/problem'
@@ -8,19 +8,16 @@ import { useResource } from '../api/resource'
 import type { JobSpec } from '../api/types'
 import { Card } from '../components/card'
 import { Combobox } from '../components/fields/combobox'
-import { Segmented } from '../components/fields/controls'
 import { Problems, TextField } from '../components/fields/field'
 import { RemovableList } from '../components/fields/removable-list'
-import { Table } from '../components/table/table'
-import { formatCount, formatExact, formatNumber } from '../format/number'
-import { inWords } from '../format/words'
-import { weighed } from '../job/preference'
+import { formatCount, formatNumber } from '../format/number'
 import { errorsByField, errorsUnder, specOf, withKinds } from './draft/build-spec'
 import { type Catalogue, variablesOf } from './draft/catalogue'
-import { type Draft, preferenceDraft } from './draft/draft'
+import type { Draft } from './draft/draft'
 import { NO_START, type StartDraft } from './draft/settings'
 import { JsonForm } from './json-form'
 import { RobotSection } from './robot/section'
+import { EffortSection, ExactPreferenceSection, MattersSection, paceOf } from './sections/matters'
 import { ScenariosSection } from './sections/scenarios-section'
 import {
   CaseSection,
@@ -33,16 +30,35 @@ import { VariablesSection } from './sections/variables-section'
 import { SubmitPanel } from './submit-panel'
 import { useSubmission } from './use-submission'
 
-export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial: Draft }) {
+interface JobFormProps {
+  readonly catalogue: Catalogue
+  readonly initial: Draft
+  /** Whether all settings are shown from the start. */
+  readonly advanced: boolean
+  /** Receives every change, and null once the job is submitted. */
+  readonly onDraft: (draft: Draft | null) => void
+}
+
+export function JobForm({ catalogue, initial, advanced, onDraft }: JobFormProps) {
   const [draft, setDraft] = useState(initial)
   const [asJson, setAsJson] = useState(false)
   const spec = useMemo(() => built(draft, catalogue), [draft, catalogue])
-  const submission = useSubmission(spec)
-  const { problem } = submission
+  const { kind, toml, urdf } = draft.robot
+  const missing = kind === 'files' && (toml === '' || urdf === '') ? 'Choose your robot first.' : ''
+  const submission = useSubmission(spec, missing, () => onDraft(null))
+  const { problem, estimate } = submission
   const errors = useMemo(
     () => errorsByField(problem instanceof ApiProblem ? problem.errors : [], draft),
     [problem, draft],
   )
+  const pace = useRef<number | null>(null)
+  pace.current = paceOf(estimate) ?? pace.current
+  // The page may be left at once.
+  useLayoutEffect(() => {
+    if (draft !== initial) onDraft(draft)
+  }, [draft])
+  const [open, setOpen] = useState(advanced)
+  const invalid = [...errors.keys()].some((key) => !SHOWN.test(key))
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
   const parts = {
     draft,
@@ -60,20 +76,48 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
       }}
     >
       <div class="stack">
-        <JobSection {...parts} />
-        <RobotSection {...parts} />
-        <VariablesSection {...parts} />
+        <RobotSection {...parts} step />
+        <MattersSection {...parts} />
         <ScenariosSection {...parts} />
-        <PreferenceSection {...parts} />
-        <CaseSection {...parts} />
-        <WorldsSection {...parts} />
-        <OptimizerSection {...parts} />
-        <StartSection {...parts} />
+        <EffortSection {...parts} pace={pace.current} />
+        <details
+          class="advanced"
+          open={open || invalid}
+          onToggle={(event) => setOpen(event.currentTarget.open)}
+        >
+          <summary>Advanced: variables, worlds, search method, start</summary>
+          <div class="stack">
+            <JobSection {...parts} />
+            <VariablesSection {...parts} />
+            <ExactPreferenceSection {...parts} />
+            <CaseSection {...parts} />
+            <WorldsSection {...parts} />
+            <OptimizerSection {...parts} />
+            <StartSection {...parts} />
+          </div>
+        </details>
       </div>
-      <SubmitPanel spec={spec} submission={submission} onJson={() => setAsJson(true)} />
+      <SubmitPanel
+        spec={spec}
+        submission={submission}
+        missing={missing}
+        onJson={() => setAsJson(true)}
+      >
+        <TextField
+          label="Name"
+          maxLength={200}
+          placeholder="optional"
+          value={draft.name}
+          error={errors.get('name')}
+          onChange={(name) => parts.onChange({ name })}
+        />
+      </SubmitPanel>
     </form>
   )
 }
+
+/** Fields outside of the advanced settings. */
+const SHOWN = /^(name|robot|scenarios|custom|preference|$)/
 
 function built(draft: Draft, catalogue: Catalogue): JobSpec {
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
@@ -138,66 +182,4 @@ function JobWords({ id }: { id: string }) {
   if (data === null) return null
   const fitness = data.best_fitness === null ? '' : `fitness ${formatNumber(data.best_fitness, 4)}`
   return <span class="muted">{[data.name, fitness].filter(Boolean).join(' · ')}</span>
-}
-
-function PreferenceSection({ draft, catalogue, errors, onChange }: SectionProps) {
-  const { preference } = draft
-  const objectives = weighed(preference)
-  const weight = (part: 'bias' | 'exponent', objective: string) => {
-    const index = objectives.indexOf(objective)
-    const value = preference[part][index]
-    if (preference.kind !== 'custom') return formatExact(Number(value))
-    const error = errors.get(`preference.${part}.${index}`)
-    const change = (text: string) => {
-      const values = preference[part].map((old, k) => (k === index ? text : old))
-      onChange({ preference: { ...preference, [part]: values } })
-    }
-    return (
-      <>
-        <input
-          class="short"
-          inputMode="decimal"
-          aria-label={`${part} of ${inWords(objective)}`}
-          aria-invalid={error !== undefined}
-          value={value}
-          onInput={(event) => change(event.currentTarget.value)}
-        />
-        {error !== undefined && <span class="wrong"> {error}</span>}
-      </>
-    )
-  }
-  return (
-    <Card title="Preference">
-      <div class="stack">
-        <Segmented
-          roomy
-          label="Preference"
-          value={preference.kind}
-          options={[...catalogue.preferences.map(({ name }) => name), 'custom'].map(
-            (name) => [name, name] as const,
-          )}
-          onChoose={(kind) =>
-            onChange({
-              preference:
-                kind === 'custom' ? { ...preference, kind } : preferenceDraft(catalogue, kind),
-            })
-          }
-        />
-        <Problems messages={[errors.get('preference')]} />
-        <Table<string>
-          caption="Biases and exponents of the objectives"
-          rows={objectives}
-          columns={[
-            { key: 'objective f', header: true, cell: inWords },
-            { key: 'bias b, in the unit of f', cell: (objective) => weight('bias', objective) },
-            { key: 'exponent e', cell: (objective) => weight('exponent', objective) },
-          ]}
-        />
-        <p class="muted small">
-          A scenario’s utility is the product of (b + f)<sup>e</sup>; the fitness is the geometric
-          mean over the scenarios.
-        </p>
-      </div>
-    </Card>
-  )
 }

@@ -13,6 +13,7 @@ import { jobPath } from '../router/routes'
 import { around, widened } from './draft/bounds'
 import { type Catalogue, loadCatalogue, variablesOf } from './draft/catalogue'
 import { type Draft, draftOf, emptyDraft, preferenceOf } from './draft/draft'
+import { forgetDraft, keepDraft, keptDraft } from './draft/kept'
 import { caseOf } from './draft/settings'
 import { FitPage, OtherKinds } from './fit/page'
 import { JobForm } from './form'
@@ -24,6 +25,8 @@ interface Start {
   readonly catalogue: Catalogue
   readonly draft: Draft
   readonly from: Job | null
+  /** Whether the draft was begun earlier. */
+  readonly kept: boolean
 }
 
 export default function NewJobPage() {
@@ -50,11 +53,6 @@ function NewTuning({ query }: { query: URLSearchParams }) {
         <div>
           <h1>New job</h1>
           {query.get('clone') === null && <OtherKinds kind="tuning" />}
-          {query.get('clone') === null && query.get('robot') !== 'own' && (
-            <p class="muted">
-              or simulate <a href="/jobs/new?robot=own">a custom robot</a> from its URDF
-            </p>
-          )}
           {from && (
             <p class="muted">
               from <a href={`/jobs/${from.id}`}>{from.name || from.id}</a>
@@ -63,11 +61,34 @@ function NewTuning({ query }: { query: URLSearchParams }) {
         </div>
       </header>
       <Loaded resource={start} what="the form">
-        {({ catalogue, draft }) =>
+        {({ catalogue, draft, kept }) =>
           from && isDocument(from, catalogue) ? (
             <JsonForm key={String(query)} spec={from.spec} />
           ) : (
-            <JobForm key={String(query)} catalogue={catalogue} initial={draft} />
+            <>
+              {kept && (
+                <p class="row kept" role="status">
+                  <span class="muted">Your draft was restored.</span>
+                  <button
+                    type="button"
+                    class="compact"
+                    onClick={() => {
+                      forgetDraft()
+                      start.reload()
+                    }}
+                  >
+                    Start over
+                  </button>
+                </p>
+              )}
+              <JobForm
+                key={`${query} ${kept}`}
+                catalogue={catalogue}
+                initial={draft}
+                advanced={String(query) !== '' && query.get('robot') !== 'own'}
+                onDraft={(changed) => from === null && keepDraft(changed)}
+              />
+            </>
           )
         }
       </Loaded>
@@ -89,7 +110,11 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   ])
   const from = cloned && withSeed(tuningOf(cloned, query), query.get('seed'))
   if (!from || isDocument(from, catalogue)) {
-    return { catalogue, draft: startingFrom(blank(catalogue, query), query), from }
+    const kept = from === null && keptDraft()
+    const draft = kept
+      ? ownRobot({ ...emptyDraft(catalogue), ...kept }, query)
+      : blank(catalogue, query)
+    return { catalogue, draft: startingFrom(draft, query), from, kept: Boolean(kept) }
   }
   let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
   const preference = preferenceOf(preferenceIn(query), catalogue)
@@ -98,12 +123,15 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   if (widen !== null) draft = widened(draft, widen)
   const design = await designIn(query, from.id, signal)
   if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
-  return { catalogue, draft, from }
+  return { catalogue, draft, from, kept: false }
 }
 
 function blank(catalogue: Catalogue, query: URLSearchParams): Draft {
-  const empty = emptyDraft(catalogue)
-  return query.get('robot') === 'own' ? { ...empty, ...ofKind(empty, 'files', empty) } : empty
+  return ownRobot(emptyDraft(catalogue), query)
+}
+
+function ownRobot(draft: Draft, query: URLSearchParams): Draft {
+  return query.get('robot') === 'own' ? { ...draft, ...ofKind(draft, 'files', draft) } : draft
 }
 
 function startingFrom(draft: Draft, query: URLSearchParams): Draft {

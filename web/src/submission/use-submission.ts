@@ -14,17 +14,21 @@ export const NOTIFY = 'Notify-URL'
 
 export type Submission = ReturnType<typeof useSubmission>
 
-/** problem: why the server rejects the spec; null if it does not, or is unknown. */
-export function useSubmission(spec: AnySpec) {
+/**
+ * problem: why the server rejects the spec; null if it does not, or is unknown.
+ * missing: what the spec lacks before the server is asked; empty if nothing.
+ */
+export function useSubmission(spec: AnySpec, missing = '', onSubmitted?: () => void) {
   const [rejected, setRejected] = useState<{ text: string; error: unknown } | null>(null)
   const [sending, setSending] = useState(false)
   const [priority, setPriority] = useState('0')
   const [notify, setNotify] = useState('')
   const text = JSON.stringify(spec)
-  const estimate = useResource(text, (signal) => post('/v1/estimates', { body: spec, signal }), {
-    keep: true,
-    pause: PAUSE_MS,
-  })
+  const estimate = useResource(
+    missing === '' ? text : null,
+    (signal) => post('/v1/estimates', { body: spec, signal }),
+    { keep: true, pause: PAUSE_MS },
+  )
   const problem = rejected?.text === text ? rejected.error : estimate.error
 
   // The same spec uses the same key, so a repeated request does not create a second job.
@@ -39,7 +43,10 @@ export function useSubmission(spec: AnySpec) {
     setSending(true)
     post('/v1/jobs', { body: spec, headers })
       .then(
-        (job) => navigate(jobPath(job.id)),
+        (job) => {
+          onSubmitted?.()
+          navigate(jobPath(job.id))
+        },
         (error: unknown) => {
           // A response invalidates the key. Without one the job may exist, so a retry must reuse the key.
           if (error instanceof ApiProblem && error.status !== 0) key.current.text = ''

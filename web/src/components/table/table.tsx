@@ -11,6 +11,8 @@ export interface Column<R> {
   readonly key: string
   /** The key, capitalized, by default. */
   readonly label?: string
+  /** Shown in place of the label. */
+  readonly heading?: ComponentChildren
   /** Shown in brackets in the header; `1` is omitted. */
   readonly unit?: string
   readonly help?: string
@@ -52,6 +54,7 @@ export function Table<R>({
   tall = false,
   rowData,
   external,
+  cards = false,
 }: {
   caption: string
   columns: readonly Column<R>[]
@@ -66,6 +69,8 @@ export function Table<R>({
   tall?: boolean
   /** `data-` attributes of a row. */
   rowData?: (row: R) => Record<`data-${string}`, string | number>
+  /** Show rows as cards on narrow screens. */
+  cards?: boolean
   /** For rows sorted by the caller: their order, and the handler that changes it. */
   external?: { readonly order: SortOrder; readonly onOrder: (column: string) => void }
 }) {
@@ -93,7 +98,7 @@ export function Table<R>({
     <div>
       {/* A scrollable box must be reachable by keyboard. */}
       <section
-        class={tall ? 'table-scroll tall' : 'table-scroll'}
+        class={cards ? 'table-scroll cards' : tall ? 'table-scroll tall' : 'table-scroll'}
         tabIndex={0}
         aria-label={`${caption}: table`}
       >
@@ -122,7 +127,7 @@ export function Table<R>({
                       {content}
                     </th>
                   ) : (
-                    <td key={column.key} class={classes(column)}>
+                    <td key={column.key} class={classes(column)} data-label={headingOf(column)}>
                       {content}
                     </td>
                   )
@@ -170,7 +175,7 @@ function Header<R>({
   onOrder: (order: SortOrder) => void
 }) {
   const active = order?.column === column.key
-  const label = (
+  const label = column.heading ?? (
     <>
       {headingOf(column)}
       <Unit unit={column.unit} />

@@ -171,14 +171,37 @@ export function constraintsText(constraints: JobSpec['constraints']): string {
 
 /** Inverse of `constraintsText`; lines that are not JSON are passed on, so that the API reports them. */
 export function constraintsOf(text: string): NonNullable<JobSpec['constraints']> {
-  const lines = text.split('\n').map((line) => line.trim())
-  return lines.filter(Boolean).map((line) => {
+  return linesOf(text).map((line) => {
     try {
       return line.startsWith('{') ? JSON.parse(line) : line
     } catch {
       return line
     }
   })
+}
+
+/** Limit of a quantity in every scenario, among constraints as text; empty if there is none. */
+export function limitOf(constraints: string, quantity: string, sign: string): string {
+  const line = linesOf(constraints).find((each) => each.startsWith(quantity + sign))
+  return line?.slice(quantity.length + sign.length) ?? ''
+}
+
+/** Replace the limit of a quantity; an empty one removes it. */
+export function withLimit(
+  constraints: string,
+  quantity: string,
+  sign: string,
+  limit: string,
+): string {
+  const others = linesOf(constraints).filter((each) => !each.startsWith(quantity + sign))
+  return [...others, ...(limit.trim() === '' ? [] : [quantity + sign + limit.trim()])].join('\n')
+}
+
+function linesOf(text: string): readonly string[] {
+  return text
+    .split('\n')
+    .map((line) => line.trim())
+    .filter(Boolean)
 }
 
 export interface StartDraft {

@@ -10,7 +10,7 @@ import { useManual } from '../../session/session'
 import { specOf } from '../draft/build-spec'
 import { variablesOf } from '../draft/catalogue'
 import type { SectionProps } from '../sections/settings'
-import { startDesign } from './job'
+import { ROBOT_FILES, startDesign } from './job'
 import { StartWalk } from './start-walk'
 import { type ActuatorChoice, useCustomRobot } from './use-custom-robot'
 
@@ -32,50 +32,69 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
   return (
     <>
-      <div class="fields">
+      <section
+        class="drop"
+        aria-label="Drop zone of the robot"
+        onDragOver={(event) => event.preventDefault()}
+        onDrop={(event) => {
+          event.preventDefault()
+          const file = event.dataTransfer?.files[0]
+          if (file) state.chooseUrdf(file)
+        }}
+      >
         <FileField
           label="URDF, xacro or MJCF"
-          accept=".urdf,.xacro,.xml,.mjcf"
-          hint={state.urdf?.name ?? 'from the job'}
-          error={robot.urdf === '' ? 'required' : undefined}
+          accept={ROBOT_FILES}
+          hint={
+            robot.urdf === ''
+              ? 'Choose the file or drop it here. Meshes are not needed.'
+              : (state.urdf?.name ?? 'as before')
+          }
           onFile={state.chooseUrdf}
         />
-        <ChoiceField
-          label="Actuators"
-          choices={ACTUATORS}
-          value={state.actuator}
-          hint="of the proposal: auto decides by the URDF’s torques and rates"
-          onChange={(actuator) => state.chooseActuator(actuator as ActuatorChoice)}
-        />
-        <FileField
-          label="robot.toml"
-          accept=".toml"
-          hint={state.toml?.name ?? 'optional; generated from the URDF by default'}
-          onFile={state.chooseToml}
-        />
-        <FileField
-          label="job.json"
-          accept=".json"
-          hint={state.job?.name ?? 'optional; scenarios, controller and variables'}
-          onFile={state.chooseJob}
-        />
-      </div>
-      <p class="muted small">
-        2 to 32 legs with three revolute joints each; wheels, arms and surplus joints are held.
-        Meshes are not needed; a file that includes others needs <code>gaitswarm robot init</code>.
-        Nothing is stored before the job is submitted. {NOT_PUBLISHED}
-      </p>
+        <p class="muted small">
+          2 to 32 legs with three revolute joints each; wheels, arms and surplus joints are held. A
+          file that includes others needs <code>gaitswarm robot init</code>. Nothing is stored
+          before the job is submitted. {NOT_PUBLISHED}
+        </p>
+      </section>
+      <details>
+        <summary>Actuators, robot.toml and job.json</summary>
+        <div class="fields">
+          <ChoiceField
+            label="Actuators"
+            choices={ACTUATORS}
+            value={state.actuator}
+            hint="of the proposal: auto decides by the URDF’s torques and rates"
+            onChange={(actuator) => state.chooseActuator(actuator as ActuatorChoice)}
+          />
+          <FileField
+            label="robot.toml"
+            accept=".toml"
+            hint={state.toml?.name ?? 'optional; generated from the URDF by default'}
+            onFile={state.chooseToml}
+          />
+          <FileField
+            label="job.json"
+            accept=".json"
+            hint={state.job?.name ?? 'optional; scenarios, controller and variables'}
+            onFile={state.chooseJob}
+          />
+        </div>
+      </details>
       {state.problem && (
         <>
           <ErrorNotice {...state.problem} />
           <p class="small">
-            Choose another file, provide a robot.toml, or edit the one below and check again.{' '}
+            {robot.toml === ''
+              ? 'Choose another file, or provide a robot.toml with it.'
+              : 'Edit robot.toml below and check again, or choose another file.'}{' '}
             {manual && <a href="/manual/docs/robot-errors.html">Errors and remedies</a>}
           </p>
         </>
       )}
       {robot.toml !== '' && (
-        <details open>
+        <details open={state.problem !== null}>
           <summary>
             robot.toml: settings missing in the URDF, with comments on guessed values
           </summary>
@@ -90,14 +109,16 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
         </details>
       )}
       <div class="row">
-        <button
-          type="button"
-          disabled={state.busy !== null || robot.toml === '' || robot.urdf === ''}
-          onClick={state.check}
-        >
-          {checked ? 'Check the robot again' : 'Check the robot'}
-        </button>
-        {state.urdf && (
+        {robot.toml !== '' && (
+          <button
+            type="button"
+            disabled={state.busy !== null || robot.urdf === ''}
+            onClick={state.check}
+          >
+            {checked ? 'Check the robot again' : 'Check the robot'}
+          </button>
+        )}
+        {state.urdf && robot.toml !== '' && (
           <button type="button" disabled={state.busy !== null} onClick={state.propose}>
             Regenerate robot.toml
           </button>
@@ -155,14 +176,14 @@ function Findings({ check, guesses }: { check: RobotCheck; guesses: readonly str
       )}
       <Table caption="Legs" columns={LEG_COLUMNS} rows={check.legs} />
       {guesses.length > 0 && (
-        <div>
-          <p>Guessed values, to be verified in robot.toml:</p>
+        <details>
+          <summary>{guesses.length} guessed values, to be verified in robot.toml</summary>
           <ul>
             {guesses.map((guess) => (
               <li key={guess}>{guess}</li>
             ))}
           </ul>
-        </div>
+        </details>
       )}
     </section>
   )

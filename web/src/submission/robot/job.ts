@@ -41,6 +41,22 @@ function objectIn(text: string): Partial<JobSpec> {
   throw new Error('job.json must hold one JSON object')
 }
 
+export const ROBOT_FILES = '.urdf,.xacro,.xml,.mjcf'
+
+let handed: File | null = null
+
+/** Pass a file on to the form of a new job. */
+export function handOver(file: File): void {
+  handed = file
+}
+
+/** The file handed over, once. */
+export function takeHanded(): File | null {
+  const file = handed
+  handed = null
+  return file
+}
+
 /** Size limit for any file [B]; the API has lower limits and reports them. */
 const MOST_BYTES = 4_000_000
 

@@ -11,14 +11,15 @@ import { CustomRobotForm } from './custom-robot'
 import { ofKind } from './job'
 
 const KINDS = [
-  ['shipped', 'shipped'],
-  ['variant', 'variant'],
-  ['files', 'custom'],
+  ['shipped', 'Shipped'],
+  ['files', 'My robot'],
+  ['variant', 'Variant'],
 ] as const
 
 const LINKS = ['coxa', 'femur', 'tibia']
 
-export function RobotSection(props: SectionProps) {
+/** step: whether it is numbered as the first step of a form. */
+export function RobotSection({ step = false, ...props }: SectionProps & { step?: boolean }) {
   const { draft, catalogue, errors, onChange } = props
   const { robot } = draft
   const { variant } = catalogue.fields
@@ -35,7 +36,17 @@ export function RobotSection(props: SectionProps) {
     />
   )
   return (
-    <Card title="Robot">
+    <Card
+      title={
+        step ? (
+          <>
+            <b class="step">1</b> Robot
+          </>
+        ) : (
+          'Robot'
+        )
+      }
+    >
       <div class="stack">
         <Segmented
           roomy
@@ -71,14 +82,17 @@ export function RobotSection(props: SectionProps) {
             ))}
           </div>
         )}
-        {robot.kind === 'files' && <CustomRobotForm {...props} />}
-        <Problems
-          messages={errorsUnder(errors, 'robot').filter((message) =>
-            robot.kind === 'files'
-              ? robot.urdf !== ''
-              : robot.kind !== 'variant' || !/^(backlash|contact_law|planned_soles)/.test(message),
-          )}
-        />
+        {robot.kind === 'files' ? (
+          // The check reports the same problems.
+          <CustomRobotForm {...props} />
+        ) : (
+          <Problems
+            messages={errorsUnder(errors, 'robot').filter(
+              (message) =>
+                robot.kind !== 'variant' || !/^(backlash|contact_law|planned_soles)/.test(message),
+            )}
+          />
+        )}
       </div>
     </Card>
   )

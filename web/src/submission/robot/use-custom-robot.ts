@@ -5,7 +5,7 @@ import { post } from '../../api/client'
 import type { RobotCheck, RobotDraftRequest } from '../../api/types'
 import type { Catalogue } from '../draft/catalogue'
 import type { Draft, RobotDraft } from '../draft/draft'
-import { robotName, textOf, withJob, withRobotJob } from './job'
+import { robotName, takeHanded, textOf, withJob, withRobotJob } from './job'
 
 export type ActuatorChoice = NonNullable<RobotDraftRequest['actuator']>
 
@@ -57,7 +57,11 @@ export function useCustomRobot(
   const files = (changes: Partial<RobotDraft>) =>
     change({ robot: { ...now.current.draft.robot, ...changes } })
   const abortController = useRef(new AbortController())
-  useEffect(() => () => abortController.current.abort(), [])
+  useEffect(() => {
+    const file = takeHanded()
+    if (file) void chooseUrdf(file)
+    return () => abortController.current.abort()
+  }, [])
 
   /** Run a request, aborting the previous one. */
   const request = async (
@@ -117,16 +121,18 @@ export function useCustomRobot(
     }
   }
 
+  const chooseUrdf = (file: File) =>
+    read(file, (urdf) => {
+      const uploadedToml = now.current.state.toml
+      set({ urdf, checked: null })
+      // The previous robot no longer applies, whatever the outcome.
+      files({ urdf: urdf.text, toml: uploadedToml?.text ?? '' })
+      return uploadedToml ? check() : propose()
+    })
+
   return {
     ...state,
-    chooseUrdf: (file: File) =>
-      read(file, (urdf) => {
-        const uploadedToml = now.current.state.toml
-        set({ urdf, checked: null })
-        // The previous robot no longer applies, whatever the outcome.
-        files({ urdf: urdf.text, toml: uploadedToml?.text ?? '' })
-        return uploadedToml ? check() : propose()
-      }),
+    chooseUrdf,
     chooseToml: (file: File) =>
       read(file, (toml) => {
         const { urdf } = now.current.state

@@ -5,8 +5,7 @@ import type { ScenarioPreset } from '../../api/types'
 import { Card } from '../../components/card'
 import { Check, Select } from '../../components/fields/controls'
 import { Problems, TextField } from '../../components/fields/field'
-import { type Column, Table } from '../../components/table/table'
-import { formatExact } from '../../format/number'
+import { exactQuantity } from '../../format/number'
 import { inWords } from '../../format/words'
 import type { FieldErrors } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
@@ -20,8 +19,15 @@ type CustomDraft = Readonly<Record<string, string>>
 /** Fields in which the thesis's scenarios differ. */
 const COMMON: ReadonlySet<string> = new Set(['cycle_time', 'load', 'slope', 'turn'])
 
+/** Fields in which presets differ for the sake of the gait. */
+const GAIT: ReadonlySet<string> = new Set(['name', 'radius', 'hip_height'])
+
+/** Scenarios of a job by default. */
+const USUAL = 6
+
 export function ScenariosSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { presets, custom } = draft
+  const [added, setAdded] = useState(false)
   const hasPresets = draft.robot.kind !== 'files' || presets.length > 0
   const names = catalogue.scenarios.map(({ name }) => name)
   // In the catalogue's order.
@@ -34,24 +40,29 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
   const add = (start: string) => {
     const preset = catalogue.scenarios.find(({ name }) => name === start) ?? null
     const name = `custom-${custom.length + 1}`
+    setAdded(true)
     onChange({ custom: [...custom, scenarioDraft(catalogue.fields.scenario, preset, name)] })
   }
+  const choice = { catalogue, selected: presets, onToggle: toggle }
   return (
     <Card title="Scenarios">
       <div class="stack">
         <Problems messages={[errors.get('scenarios')]} />
         {hasPresets ? (
-          <Table
-            caption="Preset scenarios"
-            rows={catalogue.scenarios}
-            rowKey={({ name }) => name}
-            columns={presetColumns(catalogue, presets, toggle)}
-          />
+          <>
+            <PresetChoices {...choice} scenarios={catalogue.scenarios.slice(0, USUAL)} />
+            <details open={presets.some((name) => names.indexOf(name) >= USUAL)}>
+              <summary>{names.length - USUAL} more scenarios</summary>
+              <PresetChoices {...choice} scenarios={catalogue.scenarios.slice(USUAL)} />
+            </details>
+          </>
         ) : (
-          <p class="muted">
-            The presets apply to Szabadka-II only. Add scenarios for this robot below, or load its
-            job.json.
-          </p>
+          custom.length === 0 && (
+            <p class="muted">
+              The presets apply to Szabadka-II only. A robot brings its scenarios; others can be
+              added here.
+            </p>
+          )
         )}
         {custom.map((scenario, index) => (
           <CustomScenario
@@ -61,6 +72,7 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
             index={index}
             catalogue={catalogue}
             errors={errors}
+            added={added && index === custom.length - 1}
             onChange={(changed) => replace(index, changed)}
           />
         ))}
@@ -79,47 +91,40 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-/** Selection, and the fields in which the presets differ. */
-function presetColumns(
-  { scenarios, fields }: Catalogue,
-  selected: readonly string[],
-  onToggle: (name: string) => void,
-): readonly Column<ScenarioPreset>[] {
-  const value = (scenario: ScenarioPreset, { name }: SchemaField) =>
-    scenario[name as keyof ScenarioPreset]
-  const differing = [...fields.scenario.values()].filter(
-    (field) =>
-      field.name !== 'name' && new Set(scenarios.map((each) => value(each, field))).size > 1,
-  )
-  return [
-    {
-      key: 'scenario',
-      header: true,
-      cell: ({ name, number }) => (
-        <span class="nowrap">
+interface PresetChoicesProps {
+  scenarios: readonly ScenarioPreset[]
+  catalogue: Catalogue
+  selected: readonly string[]
+  onToggle: (name: string) => void
+}
+
+/** Presets, with the values in which they differ from the first. */
+function PresetChoices({ scenarios, catalogue, selected, onToggle }: PresetChoicesProps) {
+  const [first] = catalogue.scenarios
+  const words = (scenario: ScenarioPreset) =>
+    [...catalogue.fields.scenario.values()]
+      .flatMap(({ name, unit }) => {
+        const value = scenario[name as keyof ScenarioPreset]
+        if (GAIT.has(name) || value === first[name as keyof ScenarioPreset]) return []
+        const shown = typeof value === 'number' ? exactQuantity(value, unit) : inWords(`${value}`)
+        return [`${inWords(name)} ${shown}`]
+      })
+      .join(', ')
+  return (
+    <ul class="presets">
+      {scenarios.map((scenario) => (
+        <li key={scenario.name}>
           <Check
             small={false}
-            label={`${number} ${name}`}
-            checked={selected.includes(name)}
-            onChange={() => onToggle(name)}
+            label={`${scenario.number} ${scenario.name}`}
+            checked={selected.includes(scenario.name)}
+            onChange={() => onToggle(scenario.name)}
           />
-        </span>
-      ),
-    },
-    ...differing.map(
-      (field): Column<ScenarioPreset> => ({
-        key: field.name,
-        label: inWords(field.name),
-        unit: field.unit,
-        help: field.description,
-        numeric: true,
-        cell: (scenario) => {
-          const shown = value(scenario, field)
-          return typeof shown === 'number' ? formatExact(shown) : inWords(String(shown ?? ''))
-        },
-      }),
-    ),
-  ]
+          <span class="muted small">{words(scenario)}</span>
+        </li>
+      ))}
+    </ul>
+  )
 }
 
 interface CustomScenarioProps {
@@ -127,10 +132,19 @@ interface CustomScenarioProps {
   index: number
   catalogue: Catalogue
   errors: FieldErrors
+  /** Whether it was just added. */
+  added: boolean
   onChange: (scenario: CustomDraft | null) => void
 }
 
-function CustomScenario({ scenario, index, catalogue, errors, onChange }: CustomScenarioProps) {
+function CustomScenario({
+  scenario,
+  index,
+  catalogue,
+  errors,
+  added,
+  onChange,
+}: CustomScenarioProps) {
   const at = `custom.${index}`
   const fields = [...catalogue.fields.scenario.values()].filter(({ name }) => name !== 'name')
   const change = (name: string) => (value: string) => onChange({ ...scenario, [name]: value })
@@ -157,8 +171,23 @@ function CustomScenario({ scenario, index, catalogue, errors, onChange }: Custom
     />
   )
   return (
-    <fieldset class="custom-scenario" data-custom={index}>
-      <legend>Custom scenario</legend>
+    <details
+      class="custom-scenario"
+      data-custom={index}
+      open={added || errors.has(at) || [...errors.keys()].some((key) => key.startsWith(`${at}.`))}
+    >
+      <summary>
+        <b>{scenario.name}</b>{' '}
+        <span class="muted">
+          {fields
+            .filter((field) => COMMON.has(field.name) && isSet(field))
+            .map(
+              ({ name, unit }) =>
+                `${inWords(name)} ${scenario[name]}${unit === '1' ? '' : ` ${unit}`}`,
+            )
+            .join(', ')}
+        </span>
+      </summary>
       <Problems messages={[errors.get(at)]} />
       <div class="fields">
         <TextField
@@ -178,6 +207,6 @@ function CustomScenario({ scenario, index, catalogue, errors, onChange }: Custom
       <button type="button" class="compact" onClick={() => onChange(null)}>
         Remove {scenario.name}
       </button>
-    </fieldset>
+    </details>
   )
 }

@@ -34,17 +34,8 @@ export interface SectionProps {
 export function JobSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { job } = catalogue.fields
   return (
-    <Card title="Job">
+    <Card title="Budget and constraints">
       <div class="fields">
-        <TextField
-          wide
-          label="Name"
-          maxLength={200}
-          placeholder="optional; need not be unique"
-          value={draft.name}
-          error={errors.get('name')}
-          onChange={(name) => onChange({ name })}
-        />
         {(['iterations', 'seed'] as const).map((name) => (
           <SchemaInput
             key={name}

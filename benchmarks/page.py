@@ -114,7 +114,7 @@ def measure(pages: Pages, url: str, job: str, *, rounds: int, steps: int = 90) -
         page.goto(f"/jobs/{job}/iterations")
         page.locator('[data-iteration="3999"] table').wait_for()
         found["scrolling the iterations"] = pictures(page, lambda: scroll(page, steps))
-        page.goto(f"/jobs/{job}/variables")
+        page.goto(f"/jobs/{job}/variables?designs=all")
         page.locator('canvas[data-rows="100000"]').wait_for()
         found["brushing 100 000 designs"] = pictures(page, lambda: brush(page, steps))
     return found

@@ -99,6 +99,22 @@ def test_another_engine_has_a_separate_table(
     expect(page.get_by_text("this walk was simulated by mujoco")).to_be_visible()
 
 
+def test_all_perturbations_fit_side_by_side_on_a_laptop(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    every = {
+        name: value for name, value in CERTIFICATE.items() if name not in ("variables", "engines")
+    }
+    job_id = server.submit(every | {"worlds": 4, "scenarios": [SHORT_WALK]})
+    server.wait_for(job_id, "succeeded")
+    visited = visit(server.url, viewport={"width": 1440, "height": 900})
+    page = visited.go(f"/jobs/{job_id}/variables")
+    axes = page.locator(".parallel-scroll")
+    expect(axes.get_by_role("img")).to_be_visible()
+    assert axes.evaluate("box => box.scrollWidth <= box.clientWidth")
+    assert axes.locator(".parallel-heads > span").count() > 20
+
+
 @pytest.mark.thorough("test_a_queued_job_has_no_front, of another kind of job")
 def test_a_queued_certificate_has_an_empty_state(
     start_server: Callable[..., Server], visit: Callable[..., Visit]

@@ -44,7 +44,9 @@ def test_a_job_without_a_feasible_design_says_what_stands_in_the_way_and_what_to
 ) -> None:
     job_id = server.submit(SMALL_JOB | {"iterations": 1, "constraints": ["speed>=0.5"]})
     server.wait_for(job_id, "succeeded")
-    card = visit(server.url).go(f"/jobs/{job_id}").get_by_role("region", name="Verdict")
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    expect(page.get_by_role("status").locator(".badge")).to_have_text("no design found")
+    card = page.get_by_role("region", name="Verdict")
     expect(card).to_contain_text("no design met the constraints; closest is")
     expect(card).to_contain_text("instead of at least 0.5 m/s")
     expect(card).to_contain_text(f"gaitswarm fork {job_id} --from 1 --iterations 2 --constraint")

@@ -10,6 +10,8 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.examples.servers import ServerProcess
+from tests.examples.walks import PUBLISHED_A
+from tests.web.conftest import SMALL_JOB
 from tests.web.test_links import SOME_OF_48
 from tests.web.visit import Visit
 
@@ -98,3 +100,23 @@ def test_a_clicked_design_is_highlighted_in_the_table(
             if marked.count() == 1:
                 return
     raise AssertionError("no click selected a design")
+
+
+def test_the_best_selected_designs_are_distinct(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    # Three values of one variable for 48 designs.
+    fixed = {name: value for name, value in PUBLISHED_A.items() if name != "FOMF"}
+    job_id = server.submit(SMALL_JOB | {"variables": ["FOMF"], "fixed": fixed})
+    job = server.wait_for(job_id, "succeeded")
+    assert job["evaluations"] > 3
+    page = visit(server.url).go(f"/jobs/{job_id}/variables")
+    expect(page.locator("[data-selected]")).to_have_attribute(
+        "data-selected", str(job["evaluations"])
+    )
+    table = page.get_by_role("table", name="Designs", exact=True)
+    expect(table.locator("tbody tr")).not_to_have_count(0)
+    values = table.locator("tbody tr").evaluate_all(
+        "rows => rows.map((row) => [...row.cells].slice(1).map((cell) => cell.innerText).join())"
+    )
+    assert len(values) == len(set(values)) <= 3

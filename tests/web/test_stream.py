@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -59,6 +60,38 @@ def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap(
     page.get_by_role("link", name="Details", exact=True).click()
     page.get_by_role("link", name="Iterations", exact=True).click()
     expect(page.get_by_text(f"{committed} of {committed}", exact=True)).to_be_visible()
+
+
+def test_failures_without_a_connection_are_retried_and_cleared(
+    server: ServerProcess, proxy: CuttableProxy, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"iterations": 5000})
+    page = visit(proxy.url, allowed=BROKEN).go(f"/jobs/{job_id}")
+    wait_for_iteration(page, 2)
+    proxy.cut()
+    expect(job_element(page)).to_have_attribute("data-stream", "stale")
+    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_text("The command failed.")).to_be_visible()
+    # The code of this section was not loaded before.
+    page.get_by_role("link", name="Explore").click()
+    expect(page.get_by_text(re.compile("^Could not load"))).to_be_visible()
+
+    proxy.mend()
+
+    expect(page.locator("[data-selected]")).to_be_visible()
+    expect(page.get_by_role("alert")).to_have_count(0)
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+
+
+def test_addresses_of_what_is_missing_lead_on(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="status of 4(04|22)").go("/jobs/none")
+    expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
+    expect(page.get_by_role("main").get_by_role("link", name="list of jobs")).to_be_visible()
+    page.goto(f"{server.url}/jobs?after=zzz")
+    page.get_by_role("button", name="Show the first page").click()
+    expect(page.get_by_role("alert")).to_have_count(0)
 
 
 def test_a_failed_job_is_shown_with_its_reason(

@@ -20,6 +20,11 @@ export class ApiProblem extends Error {
   }
 }
 
+/** Whether there was no response at all, so that the same request may succeed later. */
+export function isOffline(error: unknown): boolean {
+  return error instanceof ApiProblem && error.status === 0
+}
+
 /** Read the problem of a response, whatever its body. */
 export async function problemOf(response: Response): Promise<ApiProblem> {
   const type = response.headers.get('content-type') ?? ''

@@ -1,6 +1,7 @@
 /** API responses as component state. */
 
 import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
+import { isOffline } from './problem'
 
 /** A pending, received or failed response; `data` is kept during a reload. */
 export interface Resource<T> {
@@ -16,6 +17,8 @@ interface Options {
   /** Time without another key before a request is sent [ms]. */
   readonly pause?: number
 }
+
+const RETRY_MS = 3000
 
 /** Fetch when `key` changes, dropping outdated responses; a null key fetches nothing. */
 export function useResource<T>(
@@ -40,7 +43,7 @@ export function useResource<T>(
     const abort = new AbortController()
     setState((s) => ({
       data: keep || s.key === key ? s.data : null,
-      error: keep ? s.error : null,
+      error: keep || isOffline(s.error) ? s.error : null,
       loading: true,
       key,
     }))
@@ -61,6 +64,12 @@ export function useResource<T>(
       abort.abort()
     }
   }, [key, turn])
+  // Without a connection, repeat the request until there is one.
+  useEffect(() => {
+    if (!isOffline(state.error)) return
+    const timer = setTimeout(() => setTurn((n) => n + 1), RETRY_MS)
+    return () => clearTimeout(timer)
+  }, [state.error])
   const reload = useCallback(() => setTurn((n) => n + 1), [])
   return { data: state.data, error: state.error, loading: state.loading, reload }
 }

@@ -25,8 +25,15 @@ export function loadCertificate({
   )
 }
 
-/** Null for other kinds, and until the job has succeeded. */
+/** Null where the state says it all, and until the job has succeeded. */
 export function useOutcome(job: StoredJob): Outcome | null {
+  const { kind, evaluations, best } = job
+  const found = useLoadedOutcome(job)
+  const nothing = job.state === 'succeeded' && kind === 'tuning' && best === null
+  return nothing && evaluations > 0 ? { text: 'no design found', tone: 'bad' } : found
+}
+
+function useLoadedOutcome(job: StoredJob): Outcome | null {
   const { id, kind, evaluations, best } = job
   const has = kind === 'calibration' ? best !== null : kind === 'certificate'
   return useResource(job.state === 'succeeded' && has ? `${id} ${evaluations}` : null, () =>

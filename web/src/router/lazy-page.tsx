@@ -20,6 +20,7 @@ export function lazyPage<P extends object>(
         setPage(() => module.default)
       }, setError)
     }, [])
+    useEffect(() => (error === null ? undefined : reloadOnceBack()), [error])
     if (error !== null) {
       return (
         <ErrorNotice
@@ -31,4 +32,22 @@ export function lazyPage<P extends object>(
     }
     return Page ? <Page {...props} /> : <Loading what={what} />
   }
+}
+
+const PROBE_MS = 2000
+
+/** Reload once a lost server responds; browsers and the bundler remember files that failed. */
+function reloadOnceBack(): () => void {
+  let lost = false
+  const probe = () =>
+    fetch(location.href, { method: 'HEAD' }).then(
+      // A server that responds at once lacks the file, and would after a reload.
+      () => lost && location.reload(),
+      () => {
+        lost = true
+      },
+    )
+  probe()
+  const timer = setInterval(probe, PROBE_MS)
+  return () => clearInterval(timer)
 }

@@ -21,7 +21,7 @@ export type Brushes = ReadonlyMap<number, Brush>
 
 /** Shorter drags, as a share of the axis, count as clicks, which clear the selection. */
 const LEAST_STROKE = 0.01
-const AXIS_WIDTH_PX = 74
+const AXIS_WIDTH_PX = 48
 const HEIGHT_PX = 380
 
 interface ParallelCoordinatesProps {

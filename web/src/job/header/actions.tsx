@@ -1,8 +1,9 @@
 /** Commands that the state of a job allows. */
 
-import { useState } from 'preact/hooks'
+import { useEffect, useState } from 'preact/hooks'
 import { get, post, put, remove } from '../../api/client'
 import { isReadable } from '../../api/jobs'
+import { isOffline } from '../../api/problem'
 import type { StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
 import { ErrorNotice } from '../../components/feedback'
@@ -25,6 +26,8 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
   const [dialog, setDialog] = useState<Dialog>(null)
   const [busy, setBusy] = useState(false)
   const [error, setError] = useState<unknown>(null)
+  // The job was loaded again: the connection is back.
+  useEffect(() => setError((shown: unknown) => (isOffline(shown) ? null : shown)), [job])
   const during = (work: Promise<void>) => {
     setBusy(true)
     setError(null)

@@ -21,6 +21,12 @@ export function Hero({ job, gain }: { job: Job; gain: Gain & { verdict: Verdict 
       <div class="hero-words">
         <h2 aria-live="polite">{headline(job, gain)}</h2>
         {lead && <p>{lead}</p>}
+        {hasEnded(job) && job.best_fitness === null && !verdict?.relax && (
+          <p>
+            The table of <a href={jobPath(job.id, 'iterations')}>iterations</a> shows why designs
+            fail. Search within other bounds, or in easier scenarios.
+          </p>
+        )}
         {verdict?.relax && (
           <CopyBlock
             label="the command that continues under relaxed constraints"

@@ -9,7 +9,7 @@ import { columnNamed, type Particles } from '../designs/particles'
 const ROOM = 0.06
 
 /** Most single designs drawn; beyond, the server returns every n-th iteration. */
-export const MOST_DOTS = 2000
+export const MOST_DOTS = 1000
 
 export type Line = ArrayLike<number | null>
 

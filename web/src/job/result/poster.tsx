@@ -13,7 +13,7 @@ import { type Point, stillOf } from './still'
 const BestWalk = lazyPage('the walk', () => import('./best-walk'))
 
 /** Enough for the paths of the feet [Hz]. */
-const RATE = 8
+const RATE = 5
 
 /** Simulate and record the best design in the first scenario. */
 export function recordBest(job: Job, rate: number, signal: AbortSignal): Promise<Recorded> {

@@ -24,6 +24,7 @@ import {
   type Codec,
   flag,
   ignore,
+  oneOf,
   PAGE_NUMBER,
   useDelayedQuery,
   useQueryValue,
@@ -46,14 +47,25 @@ import { PairCard } from './pair-card'
 const NONE: Brushes = new Map()
 const RENEW_MS = 8000
 
+/** Designs loaded at first; more take seconds on slow connections and machines. */
+const SAMPLE_SIZE = 3000
+
+/** Best designs listed, and those examined for distinct ones. */
+const LISTED = 20
+const MOST_BEST = 200
+
 export default function VariablesPanel({ job }: { job: Job }) {
   const iterations = useSlowly(job.iterations, RENEW_MS)
+  const [all, setAll] = useQueryValue('designs', oneOf(['sample', 'all'], 'sample'), 'sample')
   const particles = useResource(
-    `${job.id} ${iterations}`,
+    `${job.id} ${iterations} ${all}`,
     (signal) =>
       getBytes('/v1/jobs/{job_id}/particles', {
         path: { job_id: job.id },
-        query: { objectives: job.kind === 'tuning' },
+        query: {
+          objectives: job.kind === 'tuning',
+          max_points: all === 'all' ? undefined : SAMPLE_SIZE,
+        },
         signal,
       }).then(decodeParticles),
     { keep: true },
@@ -66,14 +78,25 @@ export default function VariablesPanel({ job }: { job: Job }) {
             Designs appear here after the first iteration.
           </EmptyCard>
         ) : (
-          <Designs job={job} particles={data} />
+          <Designs
+            job={job}
+            particles={data}
+            onAll={all === 'all' ? undefined : () => setAll('all')}
+          />
         )
       }
     </Loaded>
   )
 }
 
-function Designs({ job, particles }: { job: Job; particles: Particles }) {
+interface DesignsProps {
+  job: Job
+  particles: Particles
+  /** Loads all designs; missing if that was requested. */
+  onAll?: () => void
+}
+
+function Designs({ job, particles, onAll }: DesignsProps) {
   const words = caseWords(job.kind)
   const [utilities, setUtilities] = useQueryValue('utilities', flag(false), false)
   const [objectives, setObjectives] = useQueryValue('objectives', flag(false), false)
@@ -90,9 +113,9 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
   const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
   const marked = useMemo(() => rowOf(particles, design), [particles, design])
   const best = useMemo(() => {
-    const rows = bestRows(model, selected, 20)
+    const rows = distinct(bestRows(model, selected, MOST_BEST), particles).slice(0, LISTED)
     return marked === null || rows.includes(marked) ? rows : [marked, ...rows]
-  }, [model, selected, marked])
+  }, [model, particles, selected, marked])
   const axes = (label: string, checked: boolean, set: (on: boolean) => void) => {
     const change = (on: boolean) => {
       set(on)
@@ -108,13 +131,18 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         title="Designs by variable"
         note={`Each line is a design. Drag along an axis to select; click it to clear.${
           thinned
-            ? ` Thinned from ${formatCount(particles.total)} designs; the best are included.`
+            ? ` A sample of ${formatCount(particles.total)} designs; the best is included.`
             : ''
         }`}
         tools={
           <>
             {axes(`${words.measures} by ${words.item}`, utilities, setUtilities)}
             {job.kind === 'tuning' && axes('objectives', objectives, setObjectives)}
+            {thinned && onAll && (
+              <button type="button" class="compact" onClick={onAll}>
+                Load all
+              </button>
+            )}
             <button
               type="button"
               class="compact"
@@ -165,6 +193,16 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
       </Card>
     </div>
   )
+}
+
+/** Rows without those whose values, and hence results, equal those of an earlier one. */
+function distinct(rows: readonly number[], { columns }: Particles): number[] {
+  const compared = columns.filter(({ kind }) => kind !== 'index')
+  const seen = new Set<string>()
+  return rows.filter((row) => {
+    const values = compared.map(({ values }) => values[row]).join()
+    return !seen.has(values) && seen.add(values)
+  })
 }
 
 /** Selection stored in the address; discarded when its axes are hidden. */

@@ -371,6 +371,28 @@ def test_a_gait_is_searched_without_the_cycle_time_that_tells_scenarios_apart() 
     assert "cycle_time" in alone.design_space().names
 
 
+def test_a_search_of_controller_and_gait_starts_from_the_reference_in_its_own_gait(
+    store: Store,
+) -> None:
+    free = JobSpec(controller="pi").with_gait_searched().design_space()
+    job = spec("*<=published:validation", **WALKS).with_gait_searched()
+    bounds = {v.name: (v.low, v.high) for v in job.design_space().variables}
+    assert [v.name for v in free.variables if bounds[v.name] != (v.low, v.high)] == [
+        *("stride", "height")
+    ]
+    assert (bounds["stride"], bounds["height"]) == ((0.06, 0.18), (0.01, 0.043))
+    published = dict(CONTROLLERS["pi"].published["validation"])
+    submitted, _ = JobService(store).submit(job)
+    assert isinstance(submitted.spec.start, tuple)
+    (start,) = submitted.spec.start
+    gait = {"stride": 0.06, "height": 0.043, "duty_factor": 0.56, "fir_ms": 12.0}
+    assert start == {"P": published["P"], "I": published["I"]} | gait
+    scenarios = [SHORT_WALK, UPHILL_WALK]
+    in_gait = gaitswarm.simulate(dict(start), controller="pi", scenarios=scenarios)
+    as_published = gaitswarm.simulate(published, controller="pi", scenarios=scenarios)
+    assert in_gait.objectives.tobytes() == as_published.objectives.tobytes()
+
+
 def test_a_fork_is_judged_by_its_own_constraints_without_simulation(store: Store) -> None:
     parent = run(store, spec())
     service = JobService(store)

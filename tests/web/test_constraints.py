@@ -8,6 +8,8 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
+from gaitswarm.services.optimizer.jobs.constraints import no_worse_than
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.test_job import fill_in, submitted
@@ -50,3 +52,23 @@ def test_a_job_without_a_feasible_design_says_what_stands_in_the_way_and_what_to
     expect(card).to_contain_text("no design met the constraints; closest is")
     expect(card).to_contain_text("instead of at least 0.5 m/s")
     expect(card).to_contain_text(f"gaitswarm fork {job_id} --from 1 --iterations 2 --constraint")
+
+
+def test_the_default_job_searches_the_gait_too_and_is_no_worse_than_the_published_design(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs/new")
+    fill_in(page, "by default", iterations=1)
+    page.get_by_text("Weights of the scenarios, all 1").click()
+    page.get_by_label(re.compile("^Weight of ")).fill("2")
+    page.get_by_role("button", name="Submit the job").click()
+    job = server.wait_for(submitted(page), "succeeded")
+    spec = job["spec"]
+    (constraint,) = spec["constraints"]
+    assert (constraint["quantity"], constraint["relative_to"]) == ("*", "published:A")
+    expected = JobSpec(constraints=(no_worse_than("published:A"),)).with_gait_searched()
+    searched = {v["name"]: (v["low"], v["high"]) for v in spec["variables"]}
+    assert searched == {v.name: (v.low, v.high) for v in expected.design_space().variables}
+    assert list(spec["scenario_weights"].values()) == [2.0]
+    verdict = server.client.get(f"/v1/jobs/{job['id']}/verdict").json()
+    assert verdict["gain"] >= 0.0 and verdict["figures"]["worse"] == 0

@@ -112,7 +112,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   if (!from || isDocument(from, catalogue)) {
     const kept = from === null && keptDraft()
     const draft = kept
-      ? ownRobot({ ...emptyDraft(catalogue), ...kept }, query)
+      ? ownRobot({ ...emptyDraft(catalogue), ...kept }, catalogue, query)
       : blank(catalogue, query)
     return { catalogue, draft: startingFrom(draft, query), from, kept: Boolean(kept) }
   }
@@ -127,11 +127,11 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
 }
 
 function blank(catalogue: Catalogue, query: URLSearchParams): Draft {
-  return ownRobot(emptyDraft(catalogue), query)
+  return ownRobot(emptyDraft(catalogue), catalogue, query)
 }
 
-function ownRobot(draft: Draft, query: URLSearchParams): Draft {
-  return query.get('robot') === 'own' ? { ...draft, ...ofKind(draft, 'files', draft) } : draft
+function ownRobot(draft: Draft, catalogue: Catalogue, query: URLSearchParams): Draft {
+  return query.get('robot') === 'own' ? { ...draft, ...ofKind(draft, 'files', catalogue) } : draft
 }
 
 function startingFrom(draft: Draft, query: URLSearchParams): Draft {

@@ -15,6 +15,7 @@ export const DOCUMENT: OpenApiDocument = {
           iterations: { type: 'integer', minimum: 1, maximum: 1_000_000, default: 25 },
           seed: { type: 'integer', minimum: 0, exclusiveMaximum: 2 ** 63, default: 1 },
           precision: { type: 'string', enum: ['single', 'double'], default: 'double' },
+          scenario_aggregate: { type: 'string', enum: ['mean', 'worst'], default: 'mean' },
         },
       },
       Scenario: {
@@ -27,6 +28,7 @@ export const DOCUMENT: OpenApiDocument = {
             description: 'Lateral distance of the feet [m].',
           },
           load: { type: 'number', minimum: 0, maximum: 50, default: 0 },
+          stride: { type: 'number', default: 0.06 },
         },
         required: ['name', 'radius'],
       },

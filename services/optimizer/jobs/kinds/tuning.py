@@ -273,12 +273,20 @@ class JobSpec(WalksSpec):
     def with_gait_searched(self) -> JobSpec:
         """Return the job with chapter 3's gait variables searched as well, unless fixed.
 
-        A cycle time in which the scenarios differ stays theirs: it makes them fast or slow.
+        A cycle time in which the scenarios differ stays theirs: it makes them fast or slow. If
+        constraints are relative to a reference, from which the job starts, bounds include the
+        scenarios' own gait, in which the reference walks.
         """
-        space = self.design_space()
-        cycle_times = {scenario.cycle_time for scenario in self.resolved_scenarios()}
-        names = GAIT_OF_CHAPTER_3 if len(cycle_times) == 1 else GAIT_OF_CHAPTER_3[1:]
-        added = tuple(name for name in names if name not in space.names)
+        space, scenarios = self.design_space(), self.resolved_scenarios()
+        relative = any(constraint.relative_to is not None for constraint in self.constraints)
+        added = []
+        for name in GAIT_OF_CHAPTER_3:
+            own = [getattr(scenario, name) for scenario in scenarios]
+            if name in space.names or (name == "cycle_time" and len(set(own)) > 1):
+                continue
+            variable = GAIT_CATALOGUE[name]
+            ends = [variable.low, variable.high, *(own if relative else ())]
+            added.append(variable.model_copy(update={"low": min(ends), "high": max(ends)}))
         document = self.model_dump() | {"variables": (*space.variables, *added)}
         return JobSpec.model_validate(document)
 

@@ -32,6 +32,7 @@ export function specOf(draft: Draft): JobSpec {
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
     ...(constraints.length > 0 && { constraints }),
+    ...measureOf(draft),
     ...(draft.case !== null && { case: settingValues(draft.case) }),
     ...(worlds !== undefined && { worlds }),
     optimizer: settingValues(draft.optimizer),
@@ -101,6 +102,21 @@ function preferenceOf({ preference }: Draft): JobSpec['preference'] {
   if (preference.kind !== 'custom') return preference.kind as JobSpec['preference']
   const [bias, exponent] = [preference.bias.map(number), preference.exponent.map(number)]
   return { bias, exponent } as unknown as JobSpec['preference']
+}
+
+/** Names of the scenarios, in the order of the spec. */
+export function scenarioNames({ presets, custom }: Draft): readonly string[] {
+  return [...presets, ...custom.map(({ name }) => name)]
+}
+
+/** Weights other than 1 of the job's scenarios, or the worst of them. */
+function measureOf(draft: Draft): Partial<JobSpec> {
+  if (draft.aggregate === 'worst') return { scenario_aggregate: 'worst' }
+  const weights = scenarioNames(draft).flatMap((name) => {
+    const text = draft.weights[name]?.trim() || '1'
+    return number(text) === 1 ? [] : [[name, number(text)]]
+  })
+  return weights.length > 0 ? { scenario_weights: Object.fromEntries(weights) } : {}
 }
 
 /** undefined for a job evaluated in the nominal model only. */

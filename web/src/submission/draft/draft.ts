@@ -59,6 +59,10 @@ export interface Draft {
   readonly preference: PreferenceDraft
   /** One per line. */
   readonly constraints: string
+  /** Of scenarios by name; 1 for all others. */
+  readonly weights: Readonly<Record<string, string>>
+  /** Of the utilities of all scenarios. */
+  readonly aggregate: string
   readonly case: CaseDraft
   readonly worlds: WorldsDraft
   readonly optimizer: OptimizerDraft
@@ -86,9 +90,10 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     controller,
     presets: list(job.get('scenarios')?.default),
     custom: [],
-    variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, usual('preference')),
-    constraints: '',
+    ...defaultSearch(catalogue, controller, 'shipped'),
+    weights: {},
+    aggregate: usual('scenario_aggregate'),
     case: null,
     worlds: worldsDraft(catalogue.fields.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, undefined, defaultMethod(catalogue)),
@@ -97,6 +102,50 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     seed: usual('seed'),
     precision: usual('precision'),
   }
+}
+
+/** Gait variables of the thesis's chapter 3, without the cycle time, in which scenarios differ. */
+const GAIT: ReadonlySet<string> = new Set(['stride', 'height', 'duty_factor', 'fir_ms'])
+
+type Search = Pick<Draft, 'variables' | 'constraints'>
+
+/**
+ * Search controller and gait, no worse than a published design, from which the search starts: bounds
+ * include the scenarios' own gait. Without a published design, search the controller alone.
+ */
+function defaultSearch(
+  catalogue: Catalogue,
+  controller: string,
+  robot: RobotDraft['kind'],
+): Search {
+  const variables = defaultVariables(catalogue, controller)
+  const names = Object.keys(
+    catalogue.controllers.find(({ name }) => name === controller)?.published ?? {},
+  )
+  if (names.length === 0 || robot === 'files') return { variables, constraints: '' }
+  const searched = Object.entries(variables).map(([name, draft]): [string, VariableDraft] => {
+    if (!GAIT.has(name)) return [name, draft]
+    const own = Number(catalogue.fields.scenario.get(name)?.default ?? draft.low)
+    const low = String(Math.min(own, Number(draft.low)))
+    return [
+      name,
+      { ...draft, low, high: String(Math.max(own, Number(draft.high))), mode: 'searched' },
+    ]
+  })
+  const published = names.includes('A') ? 'A' : names[0]
+  return { variables: Object.fromEntries(searched), constraints: `*<=published:${published}` }
+}
+
+/** Search another controller or kind of robot by default; other constraints stay. */
+export function withSearch(
+  draft: Draft,
+  catalogue: Catalogue,
+  { controller = draft.controller, robot = draft.robot }: Partial<Draft>,
+): Search & Pick<Draft, 'controller' | 'robot'> {
+  const before = defaultSearch(catalogue, draft.controller, draft.robot.kind)
+  const { variables, constraints } = defaultSearch(catalogue, controller, robot.kind)
+  const edited = draft.constraints !== before.constraints
+  return { controller, robot, variables, constraints: edited ? draft.constraints : constraints }
 }
 
 /** Search all variables of a controller within the catalogue's bounds; keep the others at their defaults. */
@@ -149,6 +198,8 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
     constraints: constraintsText(spec.constraints),
+    weights: settingTexts(spec.scenario_weights ?? {}),
+    aggregate: spec.scenario_aggregate ?? empty.aggregate,
     case: caseOf(spec.case, catalogue.cases),
     worlds: worldsDraft(catalogue.fields.worlds, spec.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, defaultMethod(catalogue)),

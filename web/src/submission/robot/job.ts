@@ -4,7 +4,7 @@ import type { JobSpec, Variable } from '../../api/types'
 import type { Design } from '../../format/value'
 import { specOf } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
-import { type Draft, draftOf, middle } from '../draft/draft'
+import { type Draft, draftOf, emptyDraft, middle, withSearch } from '../draft/draft'
 
 /** Apply a job.json to the draft, except name and robot. Throws a message for the user. */
 export function withRobotJob(draft: Draft, catalogue: Catalogue, text: string): Draft {
@@ -23,11 +23,16 @@ export function withJob(draft: Draft, catalogue: Catalogue, settings: Partial<Jo
   return { ...draftOf({ ...rest, ...settings } as JobSpec, catalogue), name, robot }
 }
 
-/** Change the kind of robot; presets do not apply to custom robots. */
-export function ofKind(draft: Draft, kind: Draft['robot']['kind'], empty: Draft): Partial<Draft> {
+/** Change the kind of robot; presets and published designs do not apply to custom robots. */
+export function ofKind(
+  draft: Draft,
+  kind: Draft['robot']['kind'],
+  catalogue: Catalogue,
+): Partial<Draft> {
   const robot = { ...draft.robot, kind }
   if ((kind === 'files') === (draft.robot.kind === 'files')) return { robot }
-  return { robot, presets: kind === 'files' ? [] : empty.presets }
+  const presets = kind === 'files' ? [] : emptyDraft(catalogue).presets
+  return { ...withSearch(draft, catalogue, { robot }), presets }
 }
 
 function objectIn(text: string): Partial<JobSpec> {

@@ -4,7 +4,7 @@ import { Card } from '../../components/card'
 import { Segmented } from '../../components/fields/controls'
 import { ChoiceField, Problems } from '../../components/fields/field'
 import { errorsUnder } from '../draft/build-spec'
-import { emptyDraft, type RobotDraft } from '../draft/draft'
+import type { RobotDraft } from '../draft/draft'
 import { SchemaInput } from '../fields/schema-input'
 import type { SectionProps } from '../sections/settings'
 import { CustomRobotForm } from './custom-robot'
@@ -53,7 +53,7 @@ export function RobotSection({ step = false, ...props }: SectionProps & { step?:
           label="Robot"
           value={robot.kind}
           options={KINDS}
-          onChoose={(kind) => onChange(ofKind(draft, kind, emptyDraft(catalogue)))}
+          onChoose={(kind) => onChange(ofKind(draft, kind, catalogue))}
         />
         {robot.kind !== 'files' && (
           <ChoiceField

@@ -218,8 +218,8 @@ export function ExactPreferenceSection({ draft, errors, onChange }: SectionProps
         ]}
       />
       <p class="muted small">
-        A scenario’s utility is the product of (b + f)<sup>e</sup>; the fitness is the geometric
-        mean over the scenarios.
+        A scenario’s utility is the product of (b + f)<sup>e</sup>; the fitness is their geometric
+        mean, or that of the worst scenario.
       </p>
     </Card>
   )

@@ -3,11 +3,11 @@
 import { useRef, useState } from 'preact/hooks'
 import type { ScenarioPreset } from '../../api/types'
 import { Card } from '../../components/card'
-import { Check, Select } from '../../components/fields/controls'
+import { Check, Segmented, Select } from '../../components/fields/controls'
 import { Problems, TextField } from '../../components/fields/field'
 import { exactQuantity } from '../../format/number'
 import { inWords } from '../../format/words'
-import type { FieldErrors } from '../draft/build-spec'
+import { type FieldErrors, scenarioNames } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
 import { scenarioDraft } from '../draft/draft'
 import type { SchemaField } from '../fields/schema-fields'
@@ -86,8 +86,47 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
             onChoose={add}
           />
         </div>
+        <Measure draft={draft} catalogue={catalogue} errors={errors} onChange={onChange} />
       </div>
     </Card>
+  )
+}
+
+/** Weights of the scenarios in the mean, or the worst of them. */
+function Measure({ draft, errors, onChange }: SectionProps) {
+  const { weights, aggregate } = draft
+  const names = scenarioNames(draft)
+  const fields = names.map((name) => (
+    <TextField
+      key={name}
+      label={`Weight of ${name}`}
+      inputMode="decimal"
+      value={weights[name] ?? '1'}
+      error={errors.get(`scenario_weights.${name}`)}
+      onChange={(value) => onChange({ weights: { ...weights, [name]: value } })}
+    />
+  ))
+  const equal = names.every((name) => (weights[name] ?? '1') === '1')
+  return (
+    <>
+      <Segmented
+        roomy
+        label="Judged by"
+        value={aggregate}
+        options={[
+          ['mean', 'geometric mean'],
+          ['worst', 'worst scenario'],
+        ]}
+        onChoose={(chosen) => onChange({ aggregate: chosen })}
+      />
+      {aggregate !== 'worst' && (
+        <details>
+          <summary>Weights of the scenarios{equal && ', all 1'}</summary>
+          <div class="fields">{fields}</div>
+        </details>
+      )}
+      <Problems messages={[errors.get('scenario_weights'), errors.get('scenario_aggregate')]} />
+    </>
   )
 }
 

@@ -10,12 +10,7 @@ import { NONE } from '../../format/number'
 import { inWords } from '../../format/words'
 import { errorsUnder, type FieldErrors } from '../draft/build-spec'
 import { ofLegGroups } from '../draft/catalogue'
-import {
-  defaultVariables,
-  type VariableDraft,
-  type VariableMode,
-  variableDraft,
-} from '../draft/draft'
+import { type VariableDraft, type VariableMode, variableDraft, withSearch } from '../draft/draft'
 import type { SectionProps } from './settings'
 
 export function VariablesSection({ draft, catalogue, errors, onChange }: SectionProps) {
@@ -46,9 +41,7 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
             value={draft.controller}
             error={errors.get('controller')}
             hint={controller?.description}
-            onChange={(name) =>
-              onChange({ controller: name, variables: defaultVariables(catalogue, name) })
-            }
+            onChange={(name) => onChange(withSearch(draft, catalogue, { controller: name }))}
           />
         </div>
         <Problems messages={[errors.get('variables'), errors.get('fixed')]} />

@@ -7,7 +7,7 @@ import { CATALOGUE } from '../catalogue-example'
 import { EMPTY, withCustomScenario } from './drafts'
 
 describe('a draft', () => {
-  test('starts with the defaults documented by the API', () => {
+  test('starts with the defaults documented by the API, and a search that keeps the published design', () => {
     expect(specOf(EMPTY)).toEqual({
       name: '',
       robot: 'hexapod',
@@ -16,9 +16,11 @@ describe('a draft', () => {
       variables: [
         { name: 'P', low: 0, high: 1 },
         { name: 'FOMF', low: 1, high: 3 },
+        { name: 'stride', low: 0.06, high: 0.2 },
       ],
       fixed: {},
       preference: 'A',
+      constraints: ['*<=published:A'],
       optimizer: { name: 'pso', particles: 25, inertia_end: 0.9 },
       iterations: 25,
       seed: 1,

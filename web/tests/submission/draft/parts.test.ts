@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest'
-import type { JobSpec } from '../../../src/api/types'
+import type { JobSpec, Variable } from '../../../src/api/types'
 import { specOf } from '../../../src/submission/draft/build-spec'
-import { type Draft, draftOf } from '../../../src/submission/draft/draft'
+import { type Draft, draftOf, withSearch } from '../../../src/submission/draft/draft'
 import {
   caseDraft,
   constraintsOf,
@@ -63,7 +63,7 @@ describe('worlds', () => {
 })
 
 describe('settings of a robot folder', () => {
-  const files: Draft = { ...EMPTY, name: 'mine', ...ofKind(EMPTY, 'files', EMPTY) }
+  const files: Draft = { ...EMPTY, name: 'mine', ...ofKind(EMPTY, 'files', CATALOGUE) }
   const slow = { name: 'slow', cycle_time: 2 }
 
   test('replace scenarios and variables of the shipped robot', () => {
@@ -82,7 +82,7 @@ describe('settings of a robot folder', () => {
   })
 
   test('are discarded when a shipped robot is chosen', () => {
-    const back = { ...files, ...ofKind(files, 'shipped', EMPTY) }
+    const back = { ...files, ...ofKind(files, 'shipped', CATALOGUE) }
     expect(specOf(back)).toEqual(specOf({ ...EMPTY, name: 'mine' }))
   })
 
@@ -122,6 +122,44 @@ describe('fields of the schema', () => {
 
   test('of a missing schema are an error', () => {
     expect(() => fieldsOf(DOCUMENT, 'Nothing')).toThrow('no schema Nothing')
+  })
+})
+
+test('scenarios have weights in the mean, or the worst one counts', () => {
+  expect(specOf(EMPTY)).not.toHaveProperty('scenario_weights')
+  const weighed = { ...EMPTY, weights: { fast: '2', loaded: ' 1 ', gone: '3' } }
+  expect(specOf(weighed)).toMatchObject({ scenario_weights: { fast: 2 } })
+  expect(specOf(draftOf(specOf(weighed), CATALOGUE))).toEqual(specOf(weighed))
+  const wrong = { ...EMPTY, weights: { fast: 'twice' } }
+  expect(specOf(wrong).scenario_weights).toEqual({ fast: 'twice' })
+  const worst = specOf({ ...weighed, aggregate: 'worst' })
+  expect(worst.scenario_aggregate).toBe('worst')
+  expect(worst).not.toHaveProperty('scenario_weights')
+  expect(draftOf(worst, CATALOGUE).aggregate).toBe('worst')
+})
+
+describe('the default job', () => {
+  const gait = { name: 'stride', low: 0.06, high: 0.2 }
+
+  test('searches controller and gait, no worse than the published design, in its gait', () => {
+    expect(specOf(EMPTY).constraints).toEqual(['*<=published:A'])
+    expect(specOf(EMPTY).variables).toContainEqual(gait)
+  })
+
+  test('searches the controller alone where no design was published', () => {
+    const own = specOf({ ...EMPTY, ...ofKind(EMPTY, 'files', CATALOGUE) })
+    expect(own).not.toHaveProperty('constraints')
+    expect(own.variables?.map((entry) => (entry as Variable).name)).toEqual(['P', 'FOMF'])
+    const [pi] = CATALOGUE.controllers
+    const controllers = [pi, { ...pi, name: 'pid', published: {} }]
+    const catalogue = { ...CATALOGUE, controllers }
+    const other = { ...EMPTY, ...withSearch(EMPTY, catalogue, { controller: 'pid' }) }
+    expect(specOf(other)).not.toHaveProperty('constraints')
+    expect(specOf(other).controller).toBe('pid')
+    const edited = withSearch({ ...EMPTY, constraints: 'speed>=1' }, catalogue, {
+      controller: 'pid',
+    })
+    expect(edited.constraints).toBe('speed>=1')
   })
 })
 

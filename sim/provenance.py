@@ -29,7 +29,6 @@ _NOT_IN_A_CASE: Final = (
     "proposal",
     "provenance.py",
     "replay.py",
-    "robot/shapes.py",
     "validation.py",
 )
 """Modules and packages of `sim` that no case uses."""

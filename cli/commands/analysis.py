@@ -344,7 +344,7 @@ def preferences(
         return fits, _fits(fits)
     if search:
         tuned = tuning_spec(job_id, jobs.job(job_id).spec, "preferences")
-        submitted = jobs.submit(PreferencesSpec.of_job(job_id, tuned))
+        submitted = jobs.submit(PreferencesSpec.document_for(job_id, tuned))
         command = f"gaitswarm preferences {submitted.id}{jobs.place}"
         return submitted, iter([f"job {submitted.id}; to see its preferences, run\n  {command}"])
     view = jobs.preferences(job_id)

@@ -108,7 +108,7 @@ def test_an_unknown_kind_names_those_there_are(client: httpx2.Client) -> None:
     assert answer.json()["errors"] == [
         {
             "field": "kind",
-            "message": "must be tuning, identification, calibration or certificate",
+            "message": "must be tuning, identification, calibration, certificate or preferences",
         }
     ]
 

@@ -97,9 +97,9 @@ def test_a_job_of_it_is_resumed_to_the_same_bits(mujoco_case: Path, tmp_path: Pa
     resumed = run(tmp_path / "half.db", "--resume", job_id)
     assert resumed["best"] == whole["best"]
 
-    refused = run_command("preferences", job_id, "--db", tmp_path / "half.db", "--samples", 5)
+    refused = run_command("preferences", job_id, "--search", "--db", tmp_path / "half.db")
     assert refused.code == 2
-    assert "samples: the job's designs were evaluated by mujoco-walk" in refused.err
+    assert "case: worlds need gaitswarm's simulator" in refused.err
 
 
 def test_with_other_code_of_the_plug_in_or_without_it_a_job_does_not_go_on(

@@ -8,11 +8,11 @@ import pytest
 from sqlalchemy import text
 
 from gaitswarm.services.optimizer.errors import IdempotencyConflict
-from gaitswarm.services.optimizer.jobs import designs
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.sim import scenario
 from gaitswarm.sim.scenario import Scenario, find_scenario
 
 REQUEST = {"controller": "pi", "scenarios": ["1", "2"], "preference": "A"}
@@ -30,7 +30,7 @@ def another_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
     def steeper(name: str) -> Scenario:
         return find_scenario(name).model_copy(update={"slope": 3.0})
 
-    monkeypatch.setattr(designs, "find_scenario", steeper)
+    monkeypatch.setattr(scenario, "find_scenario", steeper)
 
 
 @pytest.mark.parametrize("change", [another_preference, another_scenario], ids=lambda f: f.__name__)

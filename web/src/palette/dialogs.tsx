@@ -79,7 +79,9 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
     { key: 'theme', label: 'Light or dark', kind: 'command', run: toggleTheme },
     { key: 'help', label: 'Keyboard shortcuts', kind: 'command', run: onHelp },
   ]
-  const listed = (jobs.data?.items ?? []).map(
+  const isNamed = (job: { id: string }) => Number(job.id === search)
+  const found = [...(jobs.data?.items ?? [])].sort((a, b) => isNamed(b) - isNamed(a))
+  const listed = found.map(
     (job): Entry => ({
       key: `job ${job.id}`,
       label: job.name || job.id,

@@ -148,14 +148,16 @@ class PreferencesSpec(Spec):
         description="Budget: this many times the optimizer's `particles` preferences.",
     )
 
-    @classmethod
-    def of_job(cls, job_id: str, spec: JobSpec) -> Self:
-        """Build the search for preferences of a tuning job, whose best design is the reference."""
+    @staticmethod
+    def document_for(job_id: str, spec: JobSpec) -> dict[str, Any]:
+        """Describe the search for preferences of a tuning job, whose best is the reference."""
         tuning = spec.model_dump(exclude={"optimizer", "iterations", "name"})
         name = f"preferences of {spec.name or job_id}"[:200]
-        return cls.model_validate(
-            {"kind": "preferences", "name": name, "tuning": tuning | {"start": {"jobs": [job_id]}}}
-        )
+        return {
+            "kind": "preferences",
+            "name": name,
+            "tuning": tuning | {"start": {"jobs": [job_id]}},
+        }
 
     @model_validator(mode="before")
     @classmethod

@@ -335,7 +335,7 @@ def preferences(
     scenarios. With --for, finds the preference that makes a design the best.
     """
     from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
-    from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
+    from gaitswarm.services.optimizer.jobs.kinds.preferences import search_document
     from gaitswarm.settings import read_place
 
     if for_design is not None:
@@ -344,7 +344,7 @@ def preferences(
         return fits, _fits(fits)
     if search:
         tuned = tuning_spec(job_id, jobs.job(job_id).spec, "preferences")
-        submitted = jobs.submit(PreferencesSpec.document_for(job_id, tuned))
+        submitted = jobs.submit(search_document(job_id, tuned))
         command = f"gaitswarm preferences {submitted.id}{jobs.place}"
         return submitted, iter([f"job {submitted.id}; to see its preferences, run\n  {command}"])
     view = jobs.preferences(job_id)

@@ -108,6 +108,13 @@ def weights_of(preference: Preference) -> dict[str, float | str]:
     )
 
 
+def search_document(job_id: str, spec: JobSpec) -> dict[str, Any]:
+    """Describe the search for preferences of a tuning job, whose best design is the reference."""
+    tuning = spec.model_dump(exclude={"optimizer", "iterations", "name"})
+    name = f"preferences of {spec.name or job_id}"[:200]
+    return {"kind": "preferences", "name": name, "tuning": tuning | {"start": {"jobs": [job_id]}}}
+
+
 class PreferencesSpec(Spec):
     """A search for preferences: each is judged by the design that is optimal under it.
 
@@ -147,17 +154,6 @@ class PreferencesSpec(Spec):
         le=1_000_000,
         description="Budget: this many times the optimizer's `particles` preferences.",
     )
-
-    @staticmethod
-    def document_for(job_id: str, spec: JobSpec) -> dict[str, Any]:
-        """Describe the search for preferences of a tuning job, whose best is the reference."""
-        tuning = spec.model_dump(exclude={"optimizer", "iterations", "name"})
-        name = f"preferences of {spec.name or job_id}"[:200]
-        return {
-            "kind": "preferences",
-            "name": name,
-            "tuning": tuning | {"start": {"jobs": [job_id]}},
-        }
 
     @model_validator(mode="before")
     @classmethod

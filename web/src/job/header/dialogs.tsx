@@ -73,7 +73,7 @@ export function ExtendDialog({ job, onCommand, onDismiss }: DialogProps) {
   )
 }
 
-/** Budget of a job that goes on, in evaluations; the API counts iterations of full size. */
+/** Budget of an extended or forked job, in evaluations; the API counts iterations of full size. */
 function useBudget(job: StoredJob, done: number) {
   const { particles, evaluations_planned: planned } = job
   const [text, setText] = useState('')

@@ -24,10 +24,7 @@ from gaitswarm.api.problems import problem, too_many_requests, unauthorized
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token
 from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
-from gaitswarm.services.optimizer.jobs.job import (
-    DEFAULT_PRIORITY,
-    Quota,
-)
+from gaitswarm.services.optimizer.jobs.job import DEFAULT_PRIORITY, Quota
 from gaitswarm.views.base import PREFIX
 
 if TYPE_CHECKING:

@@ -161,11 +161,7 @@ def found_mesh(name: str, places: Iterable[Path]) -> Path | str:
 
 
 def package_places(name: str, folder: Path, packages: Packages = ()) -> Iterator[Path]:
-    """Yield folders of a ROS package, existing or not.
-
-    Those given by name come first; then folders that have the name, or a package.xml with it: the
-    URDF's own and those above it, those given, those of ROS_PACKAGE_PATH; and their subfolders.
-    """
+    """Yield folders of a ROS package: given by name, of the URDF and above it, then searched."""
     yield from (place for given, place in packages if given == name)
     own = folder.resolve()
     listed = filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep))
@@ -184,12 +180,7 @@ def _package_in(folder: Path) -> str | None:
 
 
 def mesh_places(name: str, folder: Path, packages: Packages = ()) -> Iterator[Path]:
-    """Yield the places of a mesh.
-
-    `package://NAME/PATH` is in a folder of that package, or PATH is next to the URDF or in a folder
-    above it. Another path is relative to the URDF's folder. A mesh found nowhere else may be a copy
-    at its `own_place`.
-    """
+    """Yield the places of a mesh: by its URL, or a copy at its `own_place`."""
     scheme, separator, rest = name.partition("://")
     if not separator:
         yield folder / name

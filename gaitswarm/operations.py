@@ -8,12 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gaitswarm.firmware import (
-    FirmwareRequest,
-    FirmwareView,
-    firmware_view,
-    run_firmware,
-)
+from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.operation import (
     After,

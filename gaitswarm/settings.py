@@ -37,9 +37,7 @@ def read_place(text: str, *, field: str) -> tuple[int, int]:
 
 _OF_TESTS: Final = re.compile(r"GAITSWARM_(REQUIRE_|SCREENSHOTS)")
 
-
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
-
 
 HostName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+(:[0-9]{1,5})?$")]
 

@@ -27,9 +27,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.services.optimizer.analysis.candidate_preferences import (
-        CandidatePreferencesView,
-    )
+    from gaitswarm.services.optimizer.analysis.candidate_preferences import CandidatePreferencesView
     from gaitswarm.services.optimizer.analysis.failures import FailuresView
     from gaitswarm.services.optimizer.analysis.front import (
         FrontView,

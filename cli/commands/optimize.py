@@ -7,13 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gaitswarm.cli.options import (
-    AcceptChanges,
-    Json,
-    SpecOptions,
-    WorkerOptions,
-    completed,
-)
+from gaitswarm.cli.options import AcceptChanges, Json, SpecOptions, WorkerOptions, completed
 from gaitswarm.cli.output import note
 from gaitswarm.services.optimizer.errors import InvalidRequest
 

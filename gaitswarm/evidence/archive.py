@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json, to_json
 
-from gaitswarm.evidence import MANIFEST
-from gaitswarm.evidence.page import CertificateOnPage, page
+from gaitswarm.evidence.page import MANIFEST, CertificateOnPage, page
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
 from gaitswarm.services.optimizer.errors import Conflict
@@ -124,11 +123,7 @@ def check_hashes(members: Mapping[str, bytes]) -> list[str]:
 
 
 def parsed_json(content: bytes, name: str) -> Any:
-    """Read a JSON document as the standard has it: no NaN, no infinities, no endless nesting.
-
-    pydantic's parser does not use Python's stack. The standard library's exhausts it before it
-    refuses deep nesting, and finalizers running at that moment fail.
-    """
+    """Read a JSON document as the standard has it, by pydantic's parser, which needs no stack."""
     if len(content) > LARGEST_TEXT:
         raise BadArchive(f"{name} is larger than {LARGEST_TEXT >> 20} MiB")
     try:

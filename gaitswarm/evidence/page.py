@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from gaitswarm.evidence import MANIFEST
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job
@@ -21,6 +20,8 @@ from gaitswarm.views.job import BestView, IterationView
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+MANIFEST: Final = "manifest.json"
 
 _INK: Final = "#1f3a5f"
 _ACCENT: Final = "#d1495b"

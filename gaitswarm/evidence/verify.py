@@ -119,10 +119,7 @@ def run_verification(
     head: str | None,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> HistoryVerificationView:
-    """Recompute a job's chain from the store and repeat some evaluations.
-
-    `check` is called with the simulated time of these [s].
-    """
+    """Recompute a job's chain, and repeat evaluations whose simulated time [s] passes `check`."""
     job, report = service.job(job_id), _Report()
     seed = secrets.randbelow(1 << 32) if seed is None else seed
     history = check_history(service.store, job, head=head)

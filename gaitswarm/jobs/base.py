@@ -80,32 +80,7 @@ from gaitswarm.views.job import (
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.types import (
-        MOST_JOBS,
-        MOST_WORST,
-        CandidatePreferencesView,
-        CatalogueView,
-        CertificateView,
-        Digest,
-        EvaluationColumns,
-        EvaluationView,
-        FailuresView,
-        ForkRequest,
-        FrontView,
-        HistoryVerificationView,
-        IdentifiabilityView,
-        ImportanceView,
-        JobComparisonView,
-        JobSpec,
-        LeaveOut,
-        PreferenceForView,
-        RankingView,
-        RecordedWalk,
-        RecordingEntryView,
-        RecordingView,
-        TargetsView,
-        VerdictView,
-    )
+    from gaitswarm.jobs import types
     from gaitswarm.services.optimizer.service import JobService
 
 P = ParamSpec("P")
@@ -131,17 +106,11 @@ Runs: TypeAlias = Annotated[
 ]
 """Ids of jobs; a request has the first in its path."""
 
-
 Priority = Annotated[int, Field(strict=True, ge=LOWEST_PRIORITY, le=HIGHEST_PRIORITY, examples=[5])]
 
 
 class Submission(BaseModel):
-    """What accompanies a new job.
-
-    Attributes:
-        idempotency_key: The same key and job again create no second job.
-        notify_url: Receives a document when the job has ended.
-    """
+    """What accompanies a new job, see `Jobs.submit`."""
 
     model_config = ConfigDict(frozen=True, defer_build=True)
 
@@ -236,7 +205,7 @@ class Jobs(ABC):
         """Create a job."""
 
     @abstractmethod
-    def _fork(self, job_id: str, request: ForkRequest, submission: Submission) -> JobView:
+    def _fork(self, job_id: str, request: types.ForkRequest, submission: Submission) -> JobView:
         """Create a fork."""
 
     @abstractmethod
@@ -598,7 +567,7 @@ class Jobs(ABC):
     @analysis("GET /jobs/{job_id}/verdict", "get_verdict", "Judge the best design in words")
     def verdict(
         self, job_id: str, *, against: Annotated[str, Field(max_length=10_000)] | None = None
-    ) -> VerdictView:
+    ) -> types.VerdictView:
         """Compare the best design of a tuning job so far with its reference in each scenario, and
         name variables at a bound and constraints at a limit; without a feasible design, name what
         stands in the way.
@@ -659,7 +628,9 @@ class Jobs(ABC):
         "List the evaluations of an iteration",
         heavy=False,
     )
-    def _evaluations(self, job_id: str, iteration: int) -> CatalogueView[EvaluationView]:
+    def _evaluations(
+        self, job_id: str, iteration: int
+    ) -> types.CatalogueView[types.EvaluationView]:
         """Return every design with its values, its fitness, and its results in each scenario.
 
         Objectives are raw; utilities follow from them and the job's preference.
@@ -695,7 +666,7 @@ class Jobs(ABC):
         scenario_weights: Mapping[str, float] | None = None,
         scenario_aggregate: ScenarioAggregate | None = None,
         top: int = 20,
-    ) -> RankingView:
+    ) -> types.RankingView:
         """Rank all designs of a job under another preference, other constraints or weights.
 
         Stored results are judged; at most references of constraints are simulated.
@@ -728,13 +699,13 @@ class Jobs(ABC):
         )
         return rank(self._service.columns(job), spec, top=top)
 
-    def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
+    def _tuning(self, job_id: str, has: str) -> tuple[types.JobSpec, types.EvaluationColumns]:
         from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 
         job = self._service.job(job_id)
         return tuning_spec(job_id, job.spec, has), self._service.columns(job)
 
-    def _feasible(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
+    def _feasible(self, job_id: str, has: str) -> tuple[types.JobSpec, types.EvaluationColumns]:
         """Return only the designs that keep the job's constraints."""
         from gaitswarm.services.optimizer.analysis.utilities import infeasible_rows
 
@@ -744,7 +715,7 @@ class Jobs(ABC):
         return spec, columns
 
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
-    def failures(self, job_id: str) -> FailuresView:
+    def failures(self, job_id: str) -> types.FailuresView:
         """Count the failed designs of a job by case and status, from stored statuses."""
         from gaitswarm.services.optimizer.analysis.failures import failures
 
@@ -752,7 +723,7 @@ class Jobs(ABC):
         return failures(self._service.columns(job), job.spec.case_names)
 
     @analysis("GET /jobs/{job_id}/importance", "get_importance", "Get the importance of variables")
-    def importance(self, job_id: str) -> ImportanceView:
+    def importance(self, job_id: str) -> types.ImportanceView:
         """Determine which variables of a job matter, from stored objectives.
 
         Raises:
@@ -777,9 +748,9 @@ class Jobs(ABC):
         self,
         job_ids: Annotated[
             Sequence[str],
-            Field(max_length=MOST_JOBS - 1, description="Further jobs, each once."),
+            Field(max_length=types.MOST_JOBS - 1, description="Further jobs, each once."),
         ],
-    ) -> JobComparisonView:
+    ) -> types.JobComparisonView:
         """Compare jobs by their convergence, their designs and their specs.
 
         Args:
@@ -808,7 +779,7 @@ class Jobs(ABC):
         *,
         constraints: Sequence[ConstraintInput] | None = None,
         most: int = 1000,
-    ) -> FrontView:
+    ) -> types.FrontView:
         """Find the Pareto front of a job over f1 to f5, from stored objectives.
 
         Args:
@@ -843,7 +814,9 @@ class Jobs(ABC):
     @analysis(
         "GET /jobs/{job_id}/preference-for", "get_preference_for", "Find a preference for a design"
     )
-    def preference_for(self, job_id: str, iteration: Index, particle: Index) -> PreferenceForView:
+    def preference_for(
+        self, job_id: str, iteration: Index, particle: Index
+    ) -> types.PreferenceForView:
         """Find the preference under which a design wins its job, from stored objectives.
 
         Args:
@@ -879,7 +852,7 @@ class Jobs(ABC):
     @analysis(
         "GET /jobs/{job_id}/parameters", "get_parameters", "Get the identifiability of parameters"
     )
-    def parameters(self, job_ids: Runs) -> IdentifiabilityView:
+    def parameters(self, job_ids: Runs) -> types.IdentifiabilityView:
         """Determine the parameters on which runs of one problem agree.
 
         Mainly for jobs of kind `identification`. A single run always narrows; only runs with
@@ -906,7 +879,9 @@ class Jobs(ABC):
         "get_targets",
         "Get the deviations of a calibration from its targets",
     )
-    def targets(self, job_ids: Runs, *, leave_out: LeaveOut | None = None) -> TargetsView:
+    def targets(
+        self, job_ids: Runs, *, leave_out: types.LeaveOut | None = None
+    ) -> types.TargetsView:
         """Return the deviations of runs of a calibration from their targets, in tolerances.
 
         Args:
@@ -947,8 +922,8 @@ class Jobs(ABC):
         job_id: str,
         *,
         worlds: Annotated[int | None, Field(ge=1, le=1_000_000)] = None,
-        most: Annotated[int, Field(ge=0, le=MOST_WORST)] = 5,
-    ) -> CertificateView:
+        most: Annotated[int, Field(ge=0, le=types.MOST_WORST)] = 5,
+    ) -> types.CertificateView:
         """Summarize the results of a design in the worlds simulated so far.
 
         The `replay` of a world is a command; its `values` are the `world` of POST /v1/replays.
@@ -977,7 +952,7 @@ class Jobs(ABC):
         "get_preferences",
         "Get the results of a search for preferences",
     )
-    def preferences(self, job_id: str) -> CandidatePreferencesView:
+    def preferences(self, job_id: str) -> types.CandidatePreferencesView:
         """List the preferences of a job of kind `preferences`, and what their optima are worth.
 
         Raises:
@@ -1057,8 +1032,8 @@ class Jobs(ABC):
         *,
         replay: Annotated[int, Field(ge=0, le=100_000, examples=[20])] = 0,
         seed: Annotated[int | None, Field(ge=0, lt=2**63)] = None,
-        head: Digest | None = None,
-    ) -> HistoryVerificationView:
+        head: types.Digest | None = None,
+    ) -> types.HistoryVerificationView:
         """Recompute the digests of a job's iterations and report the first that differs.
 
         Evaluations can be simulated again to compare every bit; their simulated time is limited.
@@ -1087,7 +1062,7 @@ class Jobs(ABC):
         status=201,
         location=lambda recording: f"/recordings/{recording.id}",
     )
-    def record(self, walk: RecordedWalk) -> RecordingView:
+    def record(self, walk: types.RecordedWalk) -> types.RecordingView:
         """Store a recorded walk, to which jobs of kind `identification` can fit parameters.
 
         The id is a hash of the content. `gaitswarm record` and POST /v1/measured-walks make a
@@ -1105,7 +1080,7 @@ class Jobs(ABC):
     @robots("GET /recordings", "list_recordings", "List recordings")
     def recordings(
         self, *, search: SearchText = "", after: After = None, limit: PageLimit = 50
-    ) -> PageView[RecordingEntryView]:
+    ) -> PageView[types.RecordingEntryView]:
         """Return a page of recordings without their numbers, newest first. New ones do not shift
         later pages.
 
@@ -1122,7 +1097,7 @@ class Jobs(ABC):
         return PageView[RecordingEntryView](items=items, next=page.next)
 
     @robots("GET /recordings/{recording_id}", "get_recording", "Get a recording")
-    def recording(self, recording_id: str) -> RecordedWalk:
+    def recording(self, recording_id: str) -> types.RecordedWalk:
         """Return a recorded walk with its numbers.
 
         Args:

@@ -83,11 +83,7 @@ def connect(
 def with_token(
     url: str, headers: Mapping[str, str] | None, token: str | None, settings: Settings
 ) -> dict[str, str]:
-    """Add a token to headers that have no Authorization.
-
-    The environment's token is sent only to the environment's server, if that is named. No token is
-    sent beyond this machine over plain HTTP, unless the settings allow it.
-    """
+    """Add a token to headers without Authorization: the environment's only for its own server."""
     from gaitswarm.jobs.server import server_url
     from gaitswarm.settings import is_loopback
 

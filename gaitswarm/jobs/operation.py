@@ -50,17 +50,11 @@ SearchText = Annotated[str, Field(max_length=200)]
 
 @dataclass(frozen=True)
 class Limits:
-    """What one request may compute.
-
-    Attributes:
-        simulated: Length of all simulations [s].
-        logged: The same, of simulations with logs [s].
-        sampled: The same, of samples of designs [s].
-    """
+    """What one request may compute: length of all its simulations [s]."""
 
     simulated: float = math.inf
     logged: float = math.inf
-    sampled: float = math.inf
+    sampled: float = math.inf  # of samples of designs
 
     def check(self, seconds: float, *, field: str, logged: bool = False) -> None:
         """Reject simulations that are too long in total."""
@@ -80,22 +74,14 @@ def _check_length(seconds: float, limit: float, advice: str, field: str) -> None
 
 @dataclass(frozen=True)
 class Context:
-    """What a server adds to the arguments of an operation.
-
-    Attributes:
-        actor: Name of the client, for the audit log.
-        quota: Of the client's unfinished jobs.
-        check_priority: Raises Forbidden for a priority that the client may not set.
-        activity: Of the workers, in the process that runs jobs.
-        robots: Folders in which to look for meshes.
-    """
+    """What a server adds to the arguments of an operation: the client, and what it may do."""
 
     actor: str = LOCAL
     quota: Quota | None = None
     limits: Limits = Limits()
-    check_priority: Callable[[int], None] = lambda _: None
+    check_priority: Callable[[int], None] = lambda _: None  # raises Forbidden
     activity: Activity | None = None
-    robots: Sequence[Path] = ()
+    robots: Sequence[Path] = ()  # folders in which to look for meshes
 
 
 @dataclass(frozen=True)
@@ -138,26 +124,10 @@ def _types() -> ModuleType:
 class Operation:
     """A method of `Jobs` and its request.
 
-    The arguments that the path does not name are the query of a GET. Otherwise they are the body:
-    a model of that name, or of that class, which may be "types." and its name in `jobs.types`;
+    The arguments that the path does not name are the query of a GET. Otherwise they are the body: a
+    model of that name, or of that class, which may be "types." and its name in `jobs.types`;
     without `body`, the only one is the whole body, and with AnySpec a spec and options are combined
     to it.
-
-    Attributes:
-        function: Computes the answer in this process.
-        path: Under the prefix of the API.
-        summary: A few words.
-        id: OpenAPI operation id.
-        heavy: Whether it simulates or reads whole histories; a server limits how many run.
-        access: Permission that a token needs.
-        status: Of a successful response.
-        optional: Whether a request may have no body.
-        media_type: Of answers that are bytes.
-        media_types: By `format`, of answers that are streams of bytes.
-        filename: Name of the download, with arguments.
-        cached: Whether clients cache the bytes by their ETag.
-        location: Path of what the operation creates, given its answer.
-        page: Whether only the web page uses it.
     """
 
     function: Callable[..., Any]
@@ -166,17 +136,17 @@ class Operation:
     tag: Tag
     summary: str
     id: str
-    heavy: bool = False
+    heavy: bool = False  # it simulates or reads whole histories; a server limits how many run
     access: Access = "read"
     status: int = 200
     body: Any = None
-    optional: bool = False
+    optional: bool = False  # a request may have no body
     media_type: str = BINARY
-    media_types: Mapping[str, str] = field(default_factory=dict)
-    filename: str | None = None
-    cached: bool = False
-    location: Callable[[Any], str] | None = None
-    page: bool = False
+    media_types: Mapping[str, str] = field(default_factory=dict)  # of streams, by `format`
+    filename: str | None = None  # of the download, with arguments
+    cached: bool = False  # by its ETag
+    location: Callable[[Any], str] | None = None  # of what it creates, given the answer
+    page: bool = False  # only the web page uses it
 
     @property
     def reads(self) -> bool:
@@ -197,7 +167,7 @@ class Operation:
         try:
             return get_type_hints(self.function, include_extras=True)
         except NameError:
-            return get_type_hints(self.function, None, vars(_types()), include_extras=True)
+            return get_type_hints(self.function, None, {"types": _types()}, include_extras=True)
 
     @property
     def result(self) -> Any:
@@ -287,18 +257,11 @@ OPERATIONS: Final[list[Operation]] = []
 
 
 def operation(tag: Tag, route: str, id: str, summary: str, **options: Any) -> Callable[[F], F]:  # noqa: A002
-    """Make a method of `Jobs`, or a function of them, an operation.
+    """Make a method of `Jobs`, or a function of them, an operation of a chapter (`tag`).
 
     Its body computes the answer in a process that has the database; jobs behind a server send a
     request instead. The docstring documents both: its text describes the operation, "Args" the
     parameters, "Returns" the answer, and "Raises" the statuses of errors.
-
-    Args:
-        tag: Chapter of the OpenAPI document.
-        route: Method and path.
-        id: OpenAPI operation id.
-        summary: A few words.
-        **options: Other attributes of `Operation`.
     """
     method, path = route.split()
 

@@ -18,12 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import MeasuredLogError
-from gaitswarm.sim.measurement.measured_csv import (
-    TIME,
-    expected_channels,
-    heading,
-    log_of_columns,
-)
+from gaitswarm.sim.measurement.measured_csv import TIME, expected_channels, heading, log_of_columns
 from gaitswarm.sim.measurement.measured_log import MeasuredLog
 from gaitswarm.sim.robot import Robot
 

@@ -42,14 +42,7 @@ from gaitswarm.sim.kernel.walk import (
 )
 from gaitswarm.sim.mujoco.gears import gears_of
 from gaitswarm.sim.mujoco.ground import GROUNDS
-from gaitswarm.sim.mujoco.mjcf import (
-    Rig,
-    Soles,
-    Surroundings,
-    height_field,
-    mjcf,
-    reach_of,
-)
+from gaitswarm.sim.mujoco.mjcf import Rig, Soles, Surroundings, height_field, mjcf, reach_of
 from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot

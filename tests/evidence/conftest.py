@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence import MANIFEST
 from gaitswarm.evidence.archive import archived
+from gaitswarm.evidence.page import MANIFEST
 from gaitswarm.zip_archive import unzipped
 from tests.examples.walks import SHORT_WALK
 

@@ -13,8 +13,8 @@ import pytest
 
 import gaitswarm
 from gaitswarm.cli.exit_codes import ExitCode
-from gaitswarm.evidence import MANIFEST
 from gaitswarm.evidence.archive import archived
+from gaitswarm.evidence.page import MANIFEST
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
 from gaitswarm.zip_archive import unzipped

@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence import MANIFEST
 from gaitswarm.evidence.archive import archived, parsed_json
+from gaitswarm.evidence.page import MANIFEST
 from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.robot import check, variant
 from gaitswarm.zip_archive import unzipped

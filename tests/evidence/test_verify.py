@@ -12,7 +12,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm import VerificationView
-from gaitswarm.evidence import MANIFEST
+from gaitswarm.evidence.page import MANIFEST
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.sim.controllers import CONTROLLERS

@@ -17,13 +17,7 @@ from gaitswarm.services.optimizer.jobs.kinds.preferences import (
 )
 from gaitswarm.services.optimizer.jobs.labels import OWN, preference_name
 from gaitswarm.services.optimizer.jobs.preference import Preference
-from gaitswarm.services.optimizer.views import (
-    DesignValues,
-    IterationIndex,
-    JobName,
-    Particle,
-    View,
-)
+from gaitswarm.services.optimizer.views import DesignValues, IterationIndex, JobName, Particle, View
 
 Figures = Annotated[dict[str, float], Field(examples=[{"energy": 77.4, "speed": 0.043}])]
 

@@ -22,12 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.bounds import (
-    End,
-    WidenedView,
-    bound_at,
-    wider_bounds,
-)
+from gaitswarm.services.optimizer.analysis.bounds import End, WidenedView, bound_at, wider_bounds
 from gaitswarm.services.optimizer.analysis.distribution import thinned
 from gaitswarm.services.optimizer.analysis.statistics import (
     CONFIDENCE,

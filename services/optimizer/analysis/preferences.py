@@ -12,10 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.front import (
-    TradeOffDesignView,
-    design_fields,
-)
+from gaitswarm.services.optimizer.analysis.front import TradeOffDesignView, design_fields
 from gaitswarm.services.optimizer.analysis.utilities import (
     NAMED,
     PreferenceOwner,
@@ -27,10 +24,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.views import (
-    Finite,
-    View,
-)
+from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]

@@ -12,11 +12,7 @@ from typing import TYPE_CHECKING, Final, TypeVar, cast
 import numpy as np
 from pydantic import Field
 
-from gaitswarm.services.optimizer.errors import (
-    GaitswarmError,
-    InvalidRequest,
-    StoreUnavailable,
-)
+from gaitswarm.services.optimizer.errors import GaitswarmError, InvalidRequest, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.constraints import (
     PUBLISHED,
     Constraint,

@@ -10,11 +10,7 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from gaitswarm.services.optimizer.jobs.preference import (
-    PREFERENCES,
-    Preference,
-    PreferenceChoice,
-)
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.sim.input import Line, Lines
 from gaitswarm.sim.robot.variant import SHIPPED, RobotFiles, RobotSource, RobotVariant
 

@@ -24,14 +24,7 @@ from gaitswarm.sim.kernel.dynamics.body import (
 )
 from gaitswarm.sim.kernel.dynamics.drives import battery_voltage
 from gaitswarm.sim.kernel.dynamics.kinds import LimbKind, limb_kinds
-from gaitswarm.sim.kernel.dynamics.limb import (
-    Environment,
-    Held,
-    LimbState,
-    after,
-    before,
-    place,
-)
+from gaitswarm.sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before, place
 from gaitswarm.sim.kernel.dynamics.spatial import Force, Inertia, Motion, Scalar, leaves, mapped
 from gaitswarm.sim.kernel.emitted.emit_c import emit_c
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size

@@ -44,8 +44,9 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
 from gaitswarm.sim.robot.robot import with_shafts
 from gaitswarm.sim.scenario import Scenario
 
-_PLANS_KEPT: Final = 16
-"""Number of scenarios whose plans are cached; most take a quarter of a megabyte."""
+_PLANS_KEPT: Final = 64
+"""Number of scenarios, and of gaits in several worlds, whose plans are cached; most take a quarter
+of a megabyte."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,7 +221,7 @@ def walking(
 def plan_of_scenario(
     robot: Robot, scenario: Scenario, timestep: float
 ) -> Callable[[ControlLaw], WalkSetup] | None:
-    """Walks in the scenario's own gait, which all tasks of a job begin with."""
+    """Walks in the scenario's own gait, or in a design's, which several worlds share."""
     return plan_walk(robot, scenario, timestep)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -131,6 +132,12 @@ class Layout:
             start += length
         self.size = start
 
+    @staticmethod
+    @lru_cache(maxsize=32)
+    def of(robot: Robot) -> Layout:
+        """Return a robot's layout, cached: each simulation needs it several times."""
+        return Layout(robot)
+
     def fields(self, packed: Floats) -> dict[str, Floats]:
         """Split a vector (P,) by field."""
         return {name: packed[where] for name, where in self.slices.items()}
@@ -190,7 +197,7 @@ def pack_parameters(
         name: np.array([getattr(contact, name) for contact in contacts])
         for name in CONTACT_LAWS[d.contact_law].parameters
     }
-    return Layout(robot).pack(
+    return Layout.of(robot).pack(
         timestep=timestep,
         gravity=gravity_on(scenario.slope, scenario.slope_direction),
         base_mass=body.mass + scenario.load,

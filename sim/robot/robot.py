@@ -202,7 +202,7 @@ class Robot:
     def n_joints(self) -> int:
         return JOINTS_PER_LEG * len(self.legs)
 
-    @property
+    @cached_property
     def has_backlash(self) -> bool:
         """Whether motors and links can move apart: with backlash or elastic shafts."""
         return self.description.elastic_shafts or any(
@@ -216,7 +216,7 @@ class Robot:
         """Whether controllers command joint torques instead of motor voltages."""
         return self.description.actuator_kind == "torque"
 
-    @property
+    @cached_property
     def has_dry_friction(self) -> bool:
         a = self.actuators()
         return bool((a.coulomb_friction + a.stribeck_friction + a.load_friction).any())

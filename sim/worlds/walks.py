@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.case import MeasuredCase, SimulatedCase
-from gaitswarm.sim.controllers import ControlLaw, ControllerName, control_law
+from gaitswarm.sim.controllers import ControllerName, control_law
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.parameters import Layout, gravity_on
@@ -48,39 +48,41 @@ _START: Final = 1
 def perturbed_setups(
     robot: Robot,
     scenario: Scenario,
-    nominal: WalkSetup,
+    nominal: Sequence[WalkSetup],
     variables: Sequence[str],
     worlds: Floats,
 ) -> list[WalkSetup]:
-    """Set up simulations of worlds (n, len(variables)); controller and gait stay nominal."""
+    """Set up a simulation in each world (n, len(variables)); controller and gait stay nominal."""
     columns = dict(zip(variables, worlds.T, strict=True))
     values = {
         name: columns.get(name, np.full(len(worlds), default)) for name, default in NOMINAL.items()
     }
-    parameters = _parameters(robot, scenario, nominal.parameters, values)
+    parameters = np.stack([setup.parameters for setup in nominal])
+    _perturb(robot, scenario, parameters, values)
     seeds = map(round, values["world_seed"].tolist())
     grounds = [
         ground_of(scenario, roughness, seed)
         for roughness, seed in zip(values["roughness"].tolist(), seeds, strict=True)
     ]
     starts = _starts(robot, scenario, nominal, parameters, values, grounds)
-    internal_states = np.tile(nominal.internal_state, (len(worlds), 1))
+    internal_states = np.stack([setup.internal_state for setup in nominal])
     if robot.has_backlash:
         internal_states[:, : robot.n_joints] = starts[:, 7:]
-    drops = nominal.drop + values["start_height"]
-    errors = _sensor_errors(values)
-    rows = zip(starts, internal_states, parameters, drops.tolist(), errors, grounds, strict=True)
+    lifts, errors = values["start_height"].tolist(), _sensor_errors(values)
+    columns_of = (nominal, starts, internal_states, parameters, lifts, errors, grounds)
     return [
         replace(
-            nominal,
+            setup,
             start=start,
             internal_state=internal_state,
             parameters=packed,
-            drop=drop,
+            drop=setup.drop + lift,
             sensors=sensors,
             terrain=ground,
         )
-        for start, internal_state, packed, drop, sensors, ground in rows
+        for setup, start, internal_state, packed, lift, sensors, ground in zip(
+            *columns_of, strict=True
+        )
     ]
 
 
@@ -107,12 +109,11 @@ def ground_of(scenario: Scenario, roughness: float = 0.0, seed: int = 0) -> Heig
     return ground and ground.placed(seed)
 
 
-def _parameters(
-    robot: Robot, scenario: Scenario, nominal: Floats, values: Mapping[str, Floats]
-) -> Floats:
-    """Kernel parameters of every world, (n, P)."""
-    slices = Layout(robot).slices
-    packed = np.tile(nominal, (len(values["load_added"]), 1))
+def _perturb(
+    robot: Robot, scenario: Scenario, packed: Floats, values: Mapping[str, Floats]
+) -> None:
+    """Change the nominal kernel parameters (n, P) to those of each world."""
+    slices = Layout.of(robot).slices
     for factor, fields in _SCALED.items():
         for field in fields:
             if field in slices:
@@ -127,13 +128,12 @@ def _parameters(
     for row, (slope, direction) in zip(packed, slopes, strict=True):
         if slope > 0.0:
             row[slices["gravity"]] = _gravity(scenario, float(slope), float(direction))
-    return packed
 
 
 def _add_masses(
     robot: Robot, scenario: Scenario, packed: Floats, values: Mapping[str, Floats]
 ) -> None:
-    slices, body = Layout(robot).slices, robot.body
+    slices, body = Layout.of(robot).slices, robot.body
     further = values["body_mass_factor"][:, np.newaxis] - 1.0
     load = (scenario.load + values["load_added"])[:, np.newaxis]
     at = np.array([[0.0, 0.0, robot.description.load_height]])
@@ -174,14 +174,14 @@ def _gravity(scenario: Scenario, slope: float, direction: float) -> Floats:
 def _starts(
     robot: Robot,
     scenario: Scenario,
-    nominal: WalkSetup,
+    nominal: Sequence[WalkSetup],
     parameters: Floats,
     values: Mapping[str, Floats],
     grounds: Sequence[HeightGrid | None],
 ) -> Floats:
     """Start positions (n, 7+J), at which each world's soles carry its weight, or above."""
-    slices = Layout(robot).slices
-    starts = np.tile(nominal.start, (len(parameters), 1))
+    slices = Layout.of(robot).slices
+    starts = np.stack([setup.start for setup in nominal])
     seeds = values["world_seed"].astype(np.uint64)
     deviates = byte_sums(seeds, 0, robot.n_joints, _START)[..., 0] / DEVIATION
     offsets = values["start_angle"][:, np.newaxis] * deviates
@@ -203,7 +203,7 @@ def _starts(
             x, y, _ = rotated(start[3:7], feet).T
             reach = reach + ground.height(x, y)
         start[2] = height_on_soles(reach, packed[slices["stiffness"]], carried)
-    starts[:, 2] += nominal.drop + values["start_height"]
+    starts[:, 2] += [setup.drop for setup in nominal] + values["start_height"]
     return starts
 
 
@@ -258,31 +258,28 @@ class PerturbedWalk(SimulatedCase):
 
     def _setups(self, robot: Robot, designs: Floats) -> dict[int, WalkSetup]:
         """Setups by index of the design, without gaits out of the legs' reach."""
+        _, timestep = control_steps(robot)
         of_gait: dict[tuple[float, ...], WalkSetup | None] = {}
-        setups = {}
-        for index, row in enumerate(designs.tolist()):
+        laws = []
+        for row in designs.tolist():
             design = dict(zip(self.variables, row, strict=True))
             gait = {name: design.pop(name) for name in self.variables if name in GAIT_CATALOGUE}
-            law = control_law(self.controller, tuple(design.items()))
-            key = tuple(gait.values())
+            key, law = tuple(gait.values()), control_law(self.controller, tuple(design.items()))
             if key not in of_gait:
-                of_gait[key] = self._in_world(robot, gait, law)
-            setup = of_gait[key]
-            if setup is not None:
-                setups[index] = replace(setup, control_law=law)
-        return setups
-
-    def _in_world(self, robot: Robot, gait: dict[str, float], law: ControlLaw) -> WalkSetup | None:
-        scenario = with_gait(self.scenario, gait)
-        _, timestep = control_steps(robot)
-        plan = (plan_walk if gait else plan_of_scenario)(robot, scenario, timestep)
-        if plan is None:
-            return None
+                plan = plan_of_scenario(robot, with_gait(self.scenario, gait), timestep)
+                of_gait[key] = plan and plan(law)
+            laws.append((key, law))
+        nominal = {key: setup for key, setup in of_gait.items() if setup is not None}
         names, values = tuple(name for name, _ in self.world), [v for _, v in self.world]
-        worlds = np.array([values], dtype=np.float64)
+        worlds = np.tile(np.array(values, dtype=np.float64), (len(nominal), 1))
         check_worlds(names, worlds)
-        (setup,) = perturbed_setups(robot, scenario, plan(law), names, worlds)
-        return setup
+        setups = perturbed_setups(robot, self.scenario, list(nominal.values()), names, worlds)
+        in_world = dict(zip(nominal, setups, strict=True))
+        return {
+            index: replace(in_world[key], control_law=law)
+            for index, (key, law) in enumerate(laws)
+            if key in in_world
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,7 +339,8 @@ class WorldWalk(SimulatedCase):
         plan = plan_walk(robot, scenario, timestep)
         if plan is None:
             return []
-        return perturbed_setups(robot, scenario, plan(law), self.variables, worlds)
+        nominal = [plan(law)] * len(worlds)
+        return perturbed_setups(robot, scenario, nominal, self.variables, worlds)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
 from gaitswarm.sim.robot.identifiable import with_parameters
 from gaitswarm.sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
+from gaitswarm.sim.simulate import plan_of_scenario
 from gaitswarm.sim.worlds import (
     DRAWN,
     MeasuredPerturbedWalk,
@@ -372,3 +373,22 @@ def test_designs_in_one_world_have_the_bits_of_worlds_of_one_design(name: str) -
         logs = together.logs[row], alone.logs[0]
         assert logs[0] is not None and logs[1] is not None
         assert np.array_equal(logs[0].base_position, logs[1].base_position)
+
+
+def test_worlds_share_the_plans_of_gaits() -> None:
+    scenario, variables = short_walk(), ("P", "I", "stride")
+    designs = np.array([[0.45, 0.1, 0.123], [0.2, 0.0, 0.131], [0.45, 0.1, 0.9], [0.3, 0.1, 0.123]])
+    names, worlds = ("world_seed", "roughness"), [(1.0, 0.0), (2.0, 0.01), (3.0, 0.0)]
+    cases = [
+        PerturbedWalk(f"world-{k}", DEFAULT_ROBOT, "pi", scenario, known, variables)
+        for k, known in enumerate(tuple(zip(names, world, strict=True)) for world in worlds)
+    ]
+    before = plan_of_scenario.cache_info().misses
+    outcomes = run_together(cases, [designs] * len(cases))
+    assert plan_of_scenario.cache_info().misses == before + 3
+    for row, (p, i, stride) in enumerate(designs.tolist()):
+        alone = case(*names, design={"P": p, "I": i, "stride": stride}).run(np.array(worlds))
+        for world, outcome in enumerate(outcomes):
+            assert outcome.statuses[row] == alone.statuses[world]
+            assert np.array_equal(outcome.objectives[row], alone.objectives[world], equal_nan=True)
+    assert outcomes[0].statuses[2] == Status.UNREACHABLE

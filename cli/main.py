@@ -59,7 +59,7 @@ _PANELS: Final = {
     "Analysis of jobs": "analysis.verdict analysis.rank analysis.front analysis.importance"
     " analysis.failures analysis.preferences plot evidence.export evidence.evidence"
     " evidence.verify",
-    "Designs": "certify.certify designs.robustness designs.firmware",
+    "Designs": "certify.certify designs.robustness designs.firmware designs.trajectories",
     "Robots and measurements": "robot.gaits robot.mjcf measurements.record measurements.recordings"
     " measurements.identify measurements.parameters measurements.calibrate measurements.targets"
     " measurements.validate",

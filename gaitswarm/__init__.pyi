@@ -62,6 +62,7 @@ from gaitswarm.sim.variables import Variable
 from gaitswarm.simulation import ScenarioResult, SimulationResult, robustness, simulate
 from gaitswarm.specs import SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
+from gaitswarm.trajectories import TrajectoriesView, write_trajectories
 from gaitswarm.views.catalogue import optimizers
 from gaitswarm.views.job import (
     BestView,
@@ -89,10 +90,11 @@ __all__ = [
     "RobustnessView", "Scenario",
     "ScenarioResult", "ServerJobs", "SimulationResult", "SpecOptions",
     "StateView", "Status", "StoreUnavailable", "SurfaceView", "Table", "Target", "TargetWalk",
-    "TargetsView", "TooManyRequests", "TuningWorlds", "Unauthorized", "Unavailable", "Unreadable",
+    "TargetsView", "TooManyRequests", "TrajectoriesView", "TuningWorlds",
+    "Unauthorized", "Unavailable", "Unreadable",
     "Variable", "VerdictView", "VerificationView", "WalkLog", "__version__", "connect",
     "job_spec", "open", "optimize", "optimizers", "robustness",
-    "simulate", "verify", "write_firmware",
+    "simulate", "verify", "write_firmware", "write_trajectories",
 ]  # fmt: skip
 
 __version__: str

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from gaitswarm.robots import check_new, new_folder
+from gaitswarm.robots import check_new, write_new
 from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.designs import ScenariosRequest
 from gaitswarm.services.optimizer.views import Finite, View
@@ -239,9 +239,5 @@ def write_firmware(
     folder = Path(output)
     check_new(folder)
     firmware = run_firmware(request)
-    with new_folder(folder) as new:
-        for name, content in firmware.files.items():
-            path = new / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+    write_new(folder, firmware.files)
     return firmware_view(request, firmware, str(folder))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -38,6 +38,7 @@ from gaitswarm.services.optimizer.analysis.surface import SurfaceRequest, Surfac
 from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.catalogue import design_numbers
@@ -46,6 +47,7 @@ from gaitswarm.sim.firmware.folder import parsed_table_bits
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.simulation import SimulationView, run_robustness, run_simulation
+from gaitswarm.trajectories import TrajectoriesRequest, trajectory_files
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,
@@ -198,17 +200,58 @@ class ServedJobs(DatabaseJobs):
         return firmware_view(request, run_firmware(request))
 
     def _firmware_of_best(self, job_id: str, table_bits: str | None) -> FirmwareRequest:
-        spec = tuning_spec(job_id, self._service.job(job_id).spec, "firmware")
-        request = FirmwareRequest(
-            robot=spec.robot,
-            controller=spec.controller,
-            design=design_numbers(spec.controller, self.best(job_id).design),
-            scenarios=spec.resolved_scenarios(),
-            label=spec.name or f"job {job_id}",
-            table_bits=None if table_bits is None else parsed_table_bits(table_bits),
-        )
+        bits = None if table_bits is None else parsed_table_bits(table_bits)
+        spec, best = self._best(job_id, "firmware")
+        label = spec.name or f"job {job_id}"
+        request = FirmwareRequest.model_validate(best | {"label": label, "table_bits": bits})
         self._context.limits.check(request.walked_seconds, field="scenarios")
         return request
+
+    @analysis(
+        "GET /jobs/{job_id}/trajectories",
+        "get_trajectories",
+        "Download the best design's joint angles for servos",
+        media_type=ZIP,
+        filename="{job_id}-trajectories.zip",
+        cached=True,
+    )
+    def trajectories(
+        self,
+        job_id: str,
+        *,
+        rate: Annotated[float, Field(ge=1.0, le=500.0)] = 50.0,
+        held: bool = True,
+    ) -> bytes:
+        """Return the desired joint angles of the best design of a job that tunes a drive, as CSV
+        and as ROS 2 messages, trajectory_msgs/msg/JointTrajectory.
+
+        The archive has the files of `gaitswarm trajectories`.
+
+        Args:
+            rate: Rows a second, changed so that a cycle has a whole number of them [Hz].
+            held: Whether held joints have columns as well.
+
+        Returns:
+            The folder, as an archive.
+
+        Raises:
+            NotFound: No design is feasible in every scenario yet.
+        """
+        _, best = self._best(job_id, "trajectories")
+        request = TrajectoriesRequest.model_validate(best | {"rate": rate, "held": held})
+        seconds = request.simulated_seconds(request.resolved_scenarios())
+        self._context.limits.check(seconds, field="scenarios")
+        return zipped(trajectory_files(request.setpoints()))
+
+    def _best(self, job_id: str, has: str) -> tuple[JobSpec, dict[str, Any]]:
+        """Spec of a job that tunes a drive, and fields of a `ScenariosRequest` of its best."""
+        spec = tuning_spec(job_id, self._service.job(job_id).spec, has)
+        return spec, {
+            "robot": spec.robot,
+            "controller": spec.controller,
+            "design": design_numbers(spec.controller, self.best(job_id).design),
+            "scenarios": spec.resolved_scenarios(),
+        }
 
     @analysis("POST /simulations", "simulate", "Simulate one design")
     def simulate(self, design: SimulationRequest) -> SimulationView:

@@ -433,6 +433,15 @@ def new_folder(folder: Path) -> Iterator[Path]:
         raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error
 
 
+def write_new(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write a folder's files by path, all or none."""
+    with new_folder(folder) as new:
+        for name, content in files.items():
+            path = new / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+
 class RobotDraftRequest(Request):
     """A URDF, xacro or MJCF text to make a robot from."""
 

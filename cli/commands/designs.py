@@ -1,4 +1,4 @@
-"""Commands about single designs: simulate, robustness, firmware."""
+"""Commands about single designs: simulate, robustness, firmware, trajectories."""
 
 from __future__ import annotations
 
@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     from gaitswarm.cli.inputs import GivenDesign
     from gaitswarm.firmware import FirmwareView
     from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
+    from gaitswarm.sim.scenario import Scenario
     from gaitswarm.simulation import Progress, SimulationView
+    from gaitswarm.trajectories import TrajectoriesView
 
 
 def simulate(
@@ -295,25 +297,27 @@ def shown_progress() -> Iterator[Progress]:
     yield progress
 
 
+_Design = Annotated[
+    str,
+    typer.Argument(
+        metavar="DESIGN|ID",
+        help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
+    ),
+]
+_NewFolder = Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="New folder.")]
+_Scenarios = Annotated[
+    str | None,
+    typer.Option(
+        help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
+        " else all]."
+    ),
+]
+
+
 def firmware(
-    design: Annotated[
-        str,
-        typer.Argument(
-            metavar="DESIGN|ID",
-            help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FOLDER", help="New folder."),
-    ],
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
-            " else all]."
-        ),
-    ] = None,
+    design: _Design,
+    output: _NewFolder,
+    scenarios: _Scenarios = None,
     controller: ControllerOption = None,
     robot: RobotOption = None,
     table_bits: Annotated[
@@ -327,24 +331,28 @@ def firmware(
     place: Place,
 ) -> Printed:
     """Write a design as C for the robot's microcontrollers, with a test against simulations."""
-    from gaitswarm.cli.inputs import chosen_scenarios, given_design
+    from gaitswarm.cli.inputs import given_design
     from gaitswarm.firmware import write_firmware
 
     given = given_design(design, controller, robot=robot, place=place)
-    if given.spec is None or scenarios is not None:
-        walks = chosen_scenarios(scenarios or "all", robot)
-    else:
-        walks = given.spec.resolved_scenarios()
     view = write_firmware(
         given.values,
         output,
-        scenarios=walks,
+        scenarios=_walks(given, scenarios, robot),
         controller=given.controller,
         robot=given.robot(robot),
         label=given.label,
         table_bits=None if table_bits is None else _bits(table_bits),
     )
     return view, _firmware(view)
+
+
+def _walks(given: GivenDesign, scenarios: str | None, robot: str | None) -> tuple[Scenario, ...]:
+    from gaitswarm.cli.inputs import chosen_scenarios
+
+    if given.spec is None or scenarios is not None:
+        return chosen_scenarios(scenarios or "all", robot)
+    return given.spec.resolved_scenarios()
 
 
 def _bits(text: str) -> tuple[int, int]:
@@ -380,3 +388,46 @@ def _firmware(view: FirmwareView) -> Parts:
         yield f"does not fit: {remark}"
     note(f"{len(view.files)} files written; to compare {view.samples} samples, run")
     note(f"  make -C {view.folder} test")
+
+
+def trajectories(
+    design: _Design,
+    output: _NewFolder,
+    scenarios: _Scenarios = None,
+    controller: ControllerOption = None,
+    robot: RobotOption = None,
+    rate: Annotated[
+        float,
+        typer.Option(help="Rows a second, changed so that a cycle has a whole number of them."),
+    ] = 50.0,
+    *,
+    held: Annotated[
+        bool, typer.Option("--held/--no-held", help="Include joints that are held at an angle.")
+    ] = True,
+    place: Place,
+) -> Printed:
+    """Write a design's joint angles for position-controlled servos, as CSV and for ROS 2."""
+    from gaitswarm.cli.inputs import given_design
+    from gaitswarm.trajectories import write_trajectories
+
+    given = given_design(design, controller, robot=robot, place=place)
+    view = write_trajectories(
+        given.values,
+        output,
+        scenarios=_walks(given, scenarios, robot),
+        controller=given.controller,
+        robot=given.robot(robot),
+        rate=rate,
+        held=held,
+    )
+    return view, _trajectories(view)
+
+
+def _trajectories(view: TrajectoriesView) -> Parts:
+    heads = ("ms by row", "rows of start", "of cycle", "of stop", "largest rad/s", "of joint")
+    rows = (
+        (of.scenario, 1e3 * of.step, *of.rows.values(), of.largest_speed, of.fastest_joint)
+        for of in view.scenarios
+    )
+    yield table(["scenario", *heads], rows)
+    note(f"{len(view.files)} files of {len(view.joints)} joints written to {view.folder}")

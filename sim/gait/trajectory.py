@@ -211,6 +211,13 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
     return plan(feet, gait)
 
 
+def stance_angles(robot: Robot, scenario: Scenario) -> Floats:
+    """Return the angles with all feet on the ground in mid-support, (J,) [rad]."""
+    rest = np.zeros(1)
+    angles = [foot.angles(rest, None, rest)[0][0] for foot in _feet(robot, scenario)]
+    return np.round(np.concatenate(angles), _DECIMALS)
+
+
 def _feet(robot: Robot, scenario: Scenario) -> tuple[_KneeUpFoot | _ChainFoot, ...]:
     legs = zip(robot.legs, leg_gaits(robot, scenario), robot.planned_soles(), strict=True)
     hips = max(leg.hip[2] for leg in robot.legs)

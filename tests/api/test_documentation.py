@@ -59,6 +59,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/preferences",
         f"get {job}/firmware",
         f"get {job}/firmware/summary",
+        f"get {job}/trajectories",
         f"post {job}/front",
         f"get {job}/preference-for",
         f"get {job}/parameters",

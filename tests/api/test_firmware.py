@@ -13,6 +13,7 @@ import pytest
 from gaitswarm.firmware import write_firmware
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.trajectories import write_trajectories
 from tests.api.conftest import Commit, Serve
 
 pytestmark = pytest.mark.slow
@@ -61,8 +62,24 @@ def test_a_jobs_best_is_written_with_the_jobs_scenarios(
     assert summary == json.loads(view.model_dump_json()) | {"folder": None}
 
 
+def test_a_jobs_trajectories_are_those_of_its_best_design(
+    client: httpx2.Client, job: Job, commit: Commit, tmp_path: Path
+) -> None:
+    commit(job, 1)
+    path = f"/v1/jobs/{job.id}/trajectories"
+    answer = client.get(path, params={"rate": 20})
+    assert answer.status_code == 200, answer.text
+    name = f'attachment; filename="{job.id}-trajectories.zip"'
+    assert answer.headers["Content-Disposition"] == name
+    best = client.get(f"/v1/jobs/{job.id}/best").json()["design"]
+    scenarios = ["normal-fast", "turn-right-fast"]
+    write_trajectories(best, tmp_path / "f", scenarios=scenarios, rate=20.0)
+    assert members(answer.content) == written(tmp_path / "f")
+    assert client.get(path, params={"rate": 4}).json()["errors"][0]["field"] == "rate"
+
+
 def test_there_is_no_firmware_without_a_design_that_walks(client: httpx2.Client, job: Job) -> None:
-    for path in ("firmware", "firmware/summary"):
+    for path in ("firmware", "firmware/summary", "trajectories"):
         assert client.get(f"/v1/jobs/{job.id}/{path}").status_code == 404
     certificate = {"kind": "certificate", "controller": "pi", "design": PI, "worlds": 1}
     other = client.post("/v1/jobs", json=certificate).json()["id"]
@@ -79,6 +96,7 @@ def test_walks_that_last_too_long_together_are_refused(
     for answer in (
         server.client.get(f"/v1/jobs/{job.id}/firmware"),
         server.client.get(f"/v1/jobs/{job.id}/firmware/summary"),
+        server.client.get(f"/v1/jobs/{job.id}/trajectories"),
     ):
         assert answer.status_code == 422
         (error,) = answer.json()["errors"]

@@ -108,6 +108,20 @@ def test_the_way_back_is_one_command(
     assert angles["whole"]["mae"] < 1e-4
 
 
+def test_the_angles_of_a_job_are_written_for_servos(
+    finished: Finished, gaitswarm: Gaitswarm, tmp_path: Path
+) -> None:
+    arguments = ("trajectories", finished.id, "--db", finished.db, "--rate", "20", "-o")
+    done = gaitswarm(*arguments, tmp_path / "json", "--json")
+    assert done.code == 0, done.err
+    scenarios = [s if isinstance(s, str) else s["name"] for s in finished.job["spec"]["scenarios"]]
+    assert [of["scenario"] for of in done.json["scenarios"]] == scenarios
+    assert set(done.json["files"]) == {path.name for path in (tmp_path / "json").iterdir()}
+    said = gaitswarm(*arguments, tmp_path / "text")
+    assert "rad/s" in said.out and scenarios[0] in said.out
+    assert f"{4 * len(scenarios)} files of 18 joints" in said.err
+
+
 def test_a_folder_of_something_else_is_refused(gaitswarm: Gaitswarm, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     done = gaitswarm("firmware", "published:A", "-o", tmp_path)

@@ -48,13 +48,19 @@ def test_memory_use_is_shown_and_firmware_is_downloaded(
     expect(tables).to_contain_text(grouped(smaller["memory"]["tables"]))
 
     with page.expect_download() as download:
-        page.get_by_role("link", name="Download").click()
+        page.get_by_role("link", name="Download", exact=True).click()
     assert download.value.suggested_filename == f"{finished_job}-firmware.zip"
     with zipfile.ZipFile(download.value.path()) as archive:
         assert {"Makefile", "tick.c", "law.h"} <= set(archive.namelist())
         assert sum(entry.file_size for entry in archive.infolist()) == sum(
             smaller["files"].values()
         )
+
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download angles").click()
+    assert download.value.suggested_filename == f"{finished_job}-trajectories.zip"
+    with zipfile.ZipFile(download.value.path()) as archive:
+        assert {"short-cycle.csv", "loaded.yaml"} <= set(archive.namelist())
 
 
 @pytest.mark.thorough("test_a_queued_job_has_no_front, on another tab")

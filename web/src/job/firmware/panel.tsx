@@ -77,6 +77,23 @@ export default function FirmwarePanel({ job }: { job: Job }) {
         </div>
       </Card>
       {firmware && <Contents firmware={firmware} />}
+      <Card
+        title="Joint angles for servos"
+        tools={
+          <a
+            class="button compact"
+            href={url('/v1/jobs/{job_id}/trajectories', { job_id: job.id })}
+            download={`${job.id}-trajectories.zip`}
+          >
+            Download angles
+          </a>
+        }
+      >
+        <p class="muted small">
+          For position-controlled servos: start, one cycle and stop of every scenario, as CSV of 50
+          rows a second and as ROS 2 JointTrajectory.
+        </p>
+      </Card>
     </div>
   )
 }

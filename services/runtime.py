@@ -81,10 +81,7 @@ def check_address(address: str | None) -> None:
 
 
 class AutoEvaluator:
-    """`Evaluator` of servers and runners: threads until a local Ray is open, and while it is lost.
-
-    If Ray cannot be started, threads remain.
-    """
+    """`Evaluator` of servers and runners: threads until a local Ray is open, or if it is lost."""
 
     def __init__(self, threads: InProcessEvaluator, ray: RayEvaluator) -> None:
         self._threads, self._ray = threads, ray

@@ -1,8 +1,4 @@
-"""Recent activity of the jobs run by this process: iterations, tasks by worker, and log messages
-
-Bounded, in memory, and lost with the process; results do not depend on it
-(docs/decisions/0023-monitoring.md).
-"""
+"""Recent activity of this process's jobs, in bounded memory (docs/decisions/0023-monitoring.md)"""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Metrics of one process, its store and its workers, in a separate registry
-
-Names, units and labels follow Prometheus's conventions: base units, `_total` for counters, and no
-label with unbounded values, such as job ids.
-"""
+"""Metrics of one process, its store and its workers, named as Prometheus's conventions say"""
 
 from __future__ import annotations
 
@@ -168,10 +164,7 @@ def failure_cause(error: str | None) -> str:
 
 
 class QueueCollector(Collector):
-    """Jobs of a database, counted at each request for metrics.
-
-    While the database is unavailable, the counts are missing and `gaitswarm_database_up` is 0.
-    """
+    """Jobs of a database, counted at each request; without counts while it is unavailable."""
 
     def __init__(self, store: Callable[[], Store]) -> None:
         self._store = store

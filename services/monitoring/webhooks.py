@@ -1,7 +1,4 @@
-"""Webhooks: POST notifications about ended jobs until they are accepted
-
-Headers and signature follow Standard Webhooks (https://www.standardwebhooks.com).
-"""
+"""Webhooks that notify about ended jobs, as in https://www.standardwebhooks.com"""
 
 from __future__ import annotations
 
@@ -80,11 +77,9 @@ class _Daemons(ThreadPoolExecutor):
 
 
 class Notifier:
-    """Sends due notifications from its own thread, from start() to stop().
+    """Sends due notifications from its own thread, from start() to stop(), each at least once.
 
-    Receivers do not wait for each other. Several processes may run one: each notification is
-    leased by one at a time. Delivery is at least once; receivers detect repetitions by
-    `webhook-id`.
+    Several processes may run one: each notification is leased by one at a time.
     """
 
     def __init__(self, store: Store, hosts: Collection[str], secret: str | None) -> None:

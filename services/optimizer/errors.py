@@ -34,10 +34,7 @@ class GaitswarmError(Exception):
 
 
 class InvalidRequest(GaitswarmError, ValueError):
-    """Invalid request.
-
-    field: dotted path of the offending field, "" for the request as a whole.
-    """
+    """Invalid request; `field` is the dotted path of the offending one, "" for the whole."""
 
     def __init__(self, message: str, *, field: str = "") -> None:
         self.field = field
@@ -76,10 +73,7 @@ class IdempotencyConflict(Conflict):
 
 
 class QuotaExceeded(Conflict):
-    """The owner's unfinished jobs would exceed the quota.
-
-    field: field of the request that exceeds it, "" for the request as a whole.
-    """
+    """The owner's unfinished jobs would exceed the quota; `field` as of InvalidRequest."""
 
     def __init__(self, message: str, *, field: str = "") -> None:
         self.field = field
@@ -99,10 +93,7 @@ class Unauthorized(Forbidden):
 
 
 class LeaseLost(GaitswarmError):
-    """The job belongs to another runner, or was cancelled.
-
-    taken_over: another runner has claimed the job.
-    """
+    """The job belongs to another runner (`taken_over`), or was cancelled."""
 
     def __init__(self, message: str, *, taken_over: bool = False) -> None:
         self.taken_over = taken_over
@@ -118,10 +109,7 @@ class Unavailable(GaitswarmError):
 
 
 class TooManyRequests(Unavailable):
-    """Too many requests or open connections.
-
-    retry_after: time after which to try again [s].
-    """
+    """Too many requests or open connections; to be repeated after `retry_after` [s]."""
 
     def __init__(self, message: str, *, retry_after: float = 1.0) -> None:
         self.retry_after = retry_after
@@ -133,10 +121,7 @@ class EvaluatorUnavailable(Unavailable):
 
 
 class StoreUnavailable(Unavailable):
-    """The database or server cannot be reached, or has another schema.
-
-    for_clients: text for clients of a server; the error's own text may quote the database driver.
-    """
+    """The database or server cannot be reached, or has another schema."""
 
     for_clients: ClassVar[str] = "the database is unavailable; see the server's log"
 

@@ -51,15 +51,10 @@ S = TypeVar("S", bound=Spec)
 
 
 class JobService:
-    """Submit, control, read and analyze jobs. Thread-safe, as the store is.
+    """Submit, control, read and analyze jobs. Thread-safe, as the store, which its owner closes.
 
-    Args:
-        store: closed by its owner.
-        provenance: provenance of what this process computes for a spec.
-        longest_job: limit on the simulated time of all of a job's simulations [s]; if finite, the
-            simulations per iteration are limited as well.
-        longest_fork: limit on the time to restore a search for a fork [s].
-        longest_reference: limit on the simulated time of the references of constraints [s].
+    Limits are simulated time of all of a job's simulations, time to restore a search for a fork,
+    and simulated time of the references of constraints [s].
     """
 
     def __init__(

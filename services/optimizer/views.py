@@ -16,10 +16,7 @@ StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled", "struck
 
 
 class View(BaseModel):
-    """A domain object as JSON. JSON has no infinities: a number that is not finite is null.
-
-    Models are built when they are first used: a command uses a few of them.
-    """
+    """A domain object as JSON, in which a number that is not finite is null."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", from_attributes=True, defer_build=True)
 

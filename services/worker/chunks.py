@@ -46,10 +46,7 @@ class Pace:
     overhead: float = 0.0  # time to send a task and its answer [s]
 
     def after(self, times: Sequence[tuple[float, float, float]]) -> Pace:
-        """Return the pace after another iteration.
-
-        times: cost [simulated s], computing time and overhead [s] of each of its tasks.
-        """
+        """Return the pace after tasks of cost [simulated s], computing time and overhead [s]."""
         cost = sum(cost for cost, _, _ in times)
         if cost <= 0.0:
             return self
@@ -80,13 +77,10 @@ def cut(
     pace: Pace | None = None,
     together: bool = True,
 ) -> tuple[Chunk, ...]:
-    """Cut an iteration into chunks, longest first.
+    """Cut an iteration into chunks, longest first, of one case that fill the kernel's lanes.
 
-    A chunk has one case, and fills the kernel's lanes. With fewer slots than cases it has some
-    designs in all cases: the kernel packs their simulations into its lanes without gaps.
-
-    durations: of each case [s]. lanes: simulations that the kernel steps together. together:
-    whether one task can simulate several cases.
+    With fewer slots than cases a chunk has some designs in all cases, which the kernel packs into
+    its lanes without gaps. durations: of each case [s].
     """
     bounds = (pace or Pace()).bounds(slots)
     if together and slots < len(durations):

@@ -263,11 +263,7 @@ def awaited(work: Future[T], should_stop: Callable[[], bool]) -> T:
 
 
 def build_kernels(cases: Sequence[Case], should_stop: Callable[[], bool]) -> None:
-    """Return when the kernels of all robots are in the cache.
-
-    Workers without a kernel there would each wait for it, and so would other jobs. Raises
-    EvaluationStopped, and KernelBuildError if the compiler refuses a kernel.
-    """
+    """Return when all robots' kernels are cached, for which workers would each wait."""
     work: Future[None] = Future()
 
     def build() -> None:

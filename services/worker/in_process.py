@@ -24,10 +24,7 @@ def available_cpus() -> int:
 
 
 class InProcessEvaluator:
-    """`Evaluator` on threads, and the `Engine` of its tasks.
-
-    cpus: number of threads; all processors by default. Raises ValueError if less than 1.
-    """
+    """`Evaluator` on threads, by default on all processors, and the `Engine` of its tasks."""
 
     def __init__(self, cpus: int | None = None) -> None:
         self.slots = cpus if cpus is not None else available_cpus()

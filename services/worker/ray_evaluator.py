@@ -63,11 +63,7 @@ _log = logging.getLogger(__name__)
 
 
 class RayEvaluator:
-    """`Evaluator` on Ray, which places tasks, retries them and scales.
-
-    Ray is opened in the background from construction on, with the arguments of `open_ray`. If it is
-    lost, the next `evaluate` opens it again.
-    """
+    """`Evaluator` on Ray, which is opened in the background, and again if it is lost."""
 
     def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:
         self._address = address
@@ -170,10 +166,8 @@ class RayEvaluator:
 class _Connection:
     """One connection to Ray, from opening to loss or closing; an `Engine`.
 
-    A local cluster ends with the thread that has started it, so one thread opens and closes it. A
-    process has one connection at a time: the next one is opened when the last one is closed.
-
-    opened: result None, or why it cannot be opened.
+    One thread opens and closes it, as a local cluster ends with the thread that has started it. A
+    process has one connection at a time.
     """
 
     def __init__(

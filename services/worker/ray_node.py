@@ -83,10 +83,7 @@ def _is_here(host: str) -> bool:
 
 
 class JoinedNode:
-    """A node without CPUs for a process on a machine that has no node of a cluster.
-
-    address: `host:port` of its head. Raises EvaluatorUnavailable if the node cannot be started.
-    """
+    """A node without CPUs for a process on a machine that has no node of a cluster."""
 
     def __init__(self, address: str) -> None:
         self._output: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115

@@ -62,11 +62,7 @@ WORKER_ENVIRONMENT: Final = {
 
 @dataclass(slots=True)
 class RaySession:
-    """A connection to Ray.
-
-    head: address of its control service. directory: files of a local cluster; None on a cluster.
-    node: this process's own node of a cluster, if no other node runs on this machine.
-    """
+    """A connection to Ray; `directory` and `node` are what it has started itself."""
 
     ray: ModuleType
     head: tuple[str, int]
@@ -110,12 +106,9 @@ class RaySession:
 def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySession:
     """Start a local cluster, or connect to the one at an address.
 
-    A local cluster ends with the thread that has opened it. Signal handlers stay as they are.
-    Raises EvaluatorUnavailable if Ray cannot be started or reached.
-
-    address: None for a local cluster; `host:port` of a cluster's head, which this process joins as
-    a node without CPUs unless one runs on this machine; `auto` for the cluster that has a node
-    here. cpus: of a local cluster; all of this machine's by default.
+    A local cluster ends with the thread that has opened it. address: `host:port` of a cluster's
+    head, which this process joins as a node without CPUs unless one runs here; or `auto` for the
+    cluster that has a node here.
     """
     for name, value in _BEFORE_IMPORT.items():
         os.environ.setdefault(name, value)

@@ -116,11 +116,7 @@ def transportable(error: Exception) -> Exception:
 
 @lru_cache(maxsize=1)
 def arithmetic_digest() -> str:
-    """Digest of NumPy's functions over their ranges; two processes with the same one round alike.
-
-    Kernels give the same bits at every instruction set. NumPy, with which desired angles and
-    controllers' tables are computed, has separate code for some.
-    """
+    """Digest of NumPy's functions over their ranges, which round alike if it is the same."""
     unit = np.linspace(-1.0, 1.0, 2003)
     wide = unit * 41.0
     results = (

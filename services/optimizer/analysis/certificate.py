@@ -383,9 +383,7 @@ def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> list[
 
 
 def _interval(correlation: float, n: int) -> tuple[float, float]:
-    """Interval of Spearman's correlation by Fisher's z, with the variance of Bonett and Wright
-    (2000).
-    """
+    """Interval of Spearman's correlation by Fisher's z, its variance of Bonett and Wright (2000)"""
     if n <= 3 or abs(correlation) >= 1.0:
         return (-1.0, 1.0) if n <= 3 else (correlation, correlation)
     z = math.atanh(correlation)

@@ -60,10 +60,7 @@ class ClosestView(View):
 
 
 def limit_views(spec: JobSpec, results: NDArray[np.float64]) -> list[LimitView]:
-    """Return every limit of a job with the value of a design.
-
-    results: (K, m) raw results.
-    """
+    """Return every limit of a job with the value of a design, given its (K, m) raw results."""
     limits = spec.limits()
     if not limits:
         return []

@@ -59,9 +59,8 @@ def retraced(
 ) -> Optimizer:
     """Replay a search up to its last ask, which is not answered.
 
-    budgets: in iterations, in order. positions: (n, d) of every iteration, at least one. feedback:
-    of every iteration. Raises ValueError if the search asks for other positions, and TimeoutError
-    when `time.monotonic` exceeds `until`.
+    positions: (n, d) of every iteration. Raises ValueError if the search asks for other positions,
+    and TimeoutError when `time.monotonic` exceeds `until`.
     """
     searches = [spec.model_copy(update={"iterations": n}).create_search() for n in budgets]
     search = searches.pop(0)
@@ -210,11 +209,7 @@ def forked(
     *,
     longest: float = math.inf,
 ) -> tuple[AnySpec, Fork]:
-    """Return the spec and origin of a fork.
-
-    look_up: returns a spec whose constraints have the values of their references.
-    longest: limit on the time to restore the search [s].
-    """
+    """Return spec and origin of a fork; `longest` limits the time to restore the search [s]."""
     before = parent.job.spec
     spec = forked_spec(before, request)
     if _REFERENCES_DEPEND_ON.intersection(changed_fields(before, spec)):
@@ -286,11 +281,7 @@ def _reason_for_new_search(parent: AnySpec, changed: Sequence[str]) -> str:
 def _search_state(
     parent: Parent, spec: AnySpec, rejudged: Floats | None, until: float
 ) -> dict[str, Any]:
-    """Return the optimizer's dump after the last ask taken over.
-
-    rejudged: (r,) fitness by another preference; None: by the parent's. until: see `retraced`.
-    Raises ValueError, TimeoutError.
-    """
+    """Return the optimizer's dump after the last ask taken over, told `rejudged` (r,) if given."""
     positions, feedback = (
         parent.positions(),
         parent.feedback(parent.job.spec, parent.columns.fitness),

@@ -1,8 +1,7 @@
 """Identifiability of fitted parameters: their intervals among good designs (thesis fig. 2.14)
 
-A search contracts whether or not a parameter matters, so the interval of one run says little. Runs
-with different seeds contract to the same value only where the measured walks determine it: the
-intervals here are over all runs, with each run's good designs relative to its own best.
+The interval of one run says little, as any search contracts: intervals are over runs with different
+seeds, with each run's good designs relative to its own best.
 """
 
 from __future__ import annotations

@@ -1,16 +1,9 @@
 """Importance of variables: first-order Sobol' indices, estimated from a job's designs
 
-The index of a variable is Var(E[Y | X]) / Var(Y), the share of an output's variance explained by
-this variable alone (Sobol' 1993; Saltelli et al., Global Sensitivity Analysis, 2008, 1.2). It is
-estimated from given data, without further simulations, by classes of the variable: the correlation
-ratio (Plischke, An effective algorithm for computing global sensitivity indices, Reliability
-Engineering & System Safety 95, 2010) with Kelley's correction for chance (PNAS 21, 1935), under
-which an irrelevant variable has 0 on average. Outputs are replaced by ranks, so that neither a few
-very bad designs nor units matter (Saltelli & Sobol', Reliability Engineering & System Safety 50,
-1995).
-
-A search does not draw its designs at random: its variables move together. So an index describes the
-designs that were tried, correlated variables share their index, and indices do not add up to 1.
+Var(E[Y | X]) / Var(Y) of an output's ranks (Saltelli et al., Global Sensitivity Analysis, 2008,
+1.2), estimated by classes of the variable: the correlation ratio (Plischke, Reliability Engineering
+& System Safety 95, 2010) with Kelley's correction for chance (PNAS 21, 1935). A search's variables
+move together, so that correlated variables share their index, and indices do not add up to 1.
 """
 
 from __future__ import annotations

@@ -164,10 +164,7 @@ def _fit(
 
 
 def _exponents(vectors: Floats, row: int, others: Rows) -> Floats:
-    """(M,) exponents under which a design has the greatest lead, or else a good rank.
-
-    vectors: (r, M) objectives with their biases, +inf for a failed design.
-    """
+    """(M,) exponents of the greatest lead or a good rank; (r, M) objectives with their biases."""
     rivals = vectors[others[np.isfinite(vectors[others]).all(axis=1)]]
     if not len(rivals):
         return np.full(vectors.shape[1], 1.0 / vectors.shape[1])
@@ -181,10 +178,7 @@ def _exponents(vectors: Floats, row: int, others: Rows) -> Floats:
 
 
 def _widest_lead(lead: Floats) -> tuple[Floats, float]:
-    """Return exponents that sum to 1 and maximize the least lead, and that lead.
-
-    lead: (n, M) logarithms of the objectives relative to the design's.
-    """
+    """Return exponents that sum to 1 and maximize the least lead over (n, M) relative logs."""
     rivals = lead.argmin(axis=0)
     exponent, promised = _program(lead[rivals])
     for _ in range(_ROUNDS):

@@ -129,15 +129,10 @@ def with_references(
     starts: bool,
     longest: float = math.inf,
 ) -> S:
-    """Return a spec whose constraints have the values of their references.
+    """Return a spec whose constraints have the values of their references, simulated in double.
 
-    The references are simulated in the job's cases, in double precision.
-
-    longest: limit on the simulated time of all references [s].
-    starts: whether a job without start designs starts from the references, which keep constraints
-    that are relative to them.
-
-    Raises InvalidRequest, which names the constraint.
+    longest: limit on the simulated time of all references [s]. starts: whether a job without start
+    designs starts from the references.
     """
     if not isinstance(spec, JobSpec) or not spec.constraints:
         return spec
@@ -265,11 +260,7 @@ def with_other_reference(
 
 
 def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
-    """Determine and store a job's reference, unless known; return why there is no gain.
-
-    Results do not depend on it. A job computed by other code is left unchanged, as that code may
-    have computed another reference.
-    """
+    """Determine and store a job's reference, unless known; return why there is no gain."""
     if job.reference is None:
         if not job.readable or not isinstance(job.spec, JobSpec):
             return job, "the job is not a tuning job"

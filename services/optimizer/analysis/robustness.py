@@ -196,9 +196,8 @@ def sensitivities(
 ) -> Sensitivities:
     """Estimate the index from the results (1 + n, K, M) of a sample in K scenarios.
 
-    Logarithms of the objectives are fitted, so that derivatives are relative changes. The
-    contribution of noise to a squared norm is subtracted. Intervals are from a bootstrap over the
-    designs, the same for all scenarios.
+    The contribution of noise to a squared norm is subtracted; intervals are from a bootstrap over
+    the designs.
     """
     values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
     usable = usable_rows(values, failed)
@@ -233,11 +232,7 @@ def sensitivities(
 
 
 def _interval(biased: float, unbiased: Floats) -> IndexView | None:
-    """Interval of a Jacobian's norm; None for NaN.
-
-    biased: squared norm of the sample's regression, the true one for its resamples.
-    unbiased: (1 + B,) less the contribution of noise, of the sample and of each resample.
-    """
+    """Interval of a Jacobian's norm by its squares, `unbiased` (1 + B,); None for NaN."""
     if math.isnan(biased):
         return None
     estimate, *resampled = np.sqrt(np.maximum(unbiased, 0.0)).tolist()

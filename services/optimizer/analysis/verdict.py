@@ -157,14 +157,7 @@ class VerdictView(View):
 def verdict(
     job: Job, best: Evaluation | None, reason: str | None, closest: ClosestView | None
 ) -> VerdictView:
-    """Judge the best design of a job.
-
-    Args:
-        job: With its reference, if that is known.
-        best: Its best design, if there is one.
-        reason: Why there is no gain, if there is none.
-        closest: Design of least violation, if none is feasible.
-    """
+    """Judge the best design of a job, if there is one; `reason`: why there is no gain."""
     reference, spec = job.reference, job.stored_spec
     quantities: list[QuantityView] = []
     sentences = [] if closest is None else [f"{closest.explanation}."]
@@ -365,10 +358,7 @@ def limits_in_words(limits: Sequence[LimitView]) -> Iterator[str]:
 
 
 def relaxed(constraints: Sequence[Constraint], violated: Sequence[LimitView]) -> list[str] | None:
-    """Return constraints as texts, those that are violated relaxed until they are not.
-
-    None if one has no text, or no multiple of its limit suffices.
-    """
+    """Return constraints as texts, violated ones relaxed until they are not; None if that fails."""
     texts = []
     for constraint in constraints:
         changes = {}

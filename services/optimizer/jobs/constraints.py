@@ -210,10 +210,7 @@ class Cases:
     columns: Sequence[Objective]
 
     def limited(self, constraint: Constraint) -> Iterator[tuple[int, int]]:
-        """Yield the indices of the cases and columns that a constraint limits.
-
-        Raises ValueError for an unknown name.
-        """
+        """Yield the indices of the cases and columns that a constraint limits, at least one."""
         names = [column.name for column in self.columns]
         for quantity in constraint.quantities:
             if quantity not in names:
@@ -230,9 +227,7 @@ class Cases:
         yield from product(cases, (names.index(quantity) for quantity in constraint.quantities))
 
     def limits(self, constraints: Sequence[Constraint], *, known: bool = True) -> list[Limit]:
-        """Return the limits of constraints by case and column.
-
-        known: whether the values of all references are; else those without are left out.
+        """Return limits by case and column; if not `known`, without those of unknown references.
 
         Raises ValueError, with the constraint's index, for unknown names, and for constraints that
         no design can meet together.
@@ -293,13 +288,7 @@ class Cases:
 
 
 def excesses(limits: Sequence[Limit], results: Floats) -> Floats:
-    """Return by how much designs violate limits, (limits, n), as multiples of the limits.
-
-    0 where a limit is kept; +inf where the quantity has no value. A limit of zero is violated by
-    the value itself.
-
-    results: (n, K, m) raw results.
-    """
+    """Return by how much (n, K, m) raw results violate limits, as multiples, (limits, n)."""
     _, case, column, sign, bound = (np.array(part) for part in zip(*limits, strict=True))
     values = np.ascontiguousarray(results[:, case, column].T)
     scale = np.where(bound == 0.0, 1.0, np.abs(bound))[:, np.newaxis]
@@ -308,10 +297,7 @@ def excesses(limits: Sequence[Limit], results: Floats) -> Floats:
 
 
 def violations(limits: Sequence[Limit], results: Floats) -> Floats:
-    """Return each design's violation (n,): the sum of its excesses; 0 if it keeps all limits.
-
-    results: (n, K, m) raw results.
-    """
+    """Return each design's violation (n,): the sum of its excesses; 0 if it keeps all limits."""
     if not limits:
         return np.zeros(len(results))
     # Along the first axis, numpy adds sequentially.

@@ -20,9 +20,8 @@ from gaitswarm.sim.variables import Variable, VariableCatalogue
 class DesignSpace:
     """Searched variables with their bounds, and fixed values.
 
-    A *position* is a point of the box, (d,) in the variables' units. A *design* is what is judged
-    and stored: integer variables rounded, categorical ones as the index of a choice, fixed values
-    appended; its columns are `names`.
+    A *position* is a point of the box, (d,). A *design* is what is judged and stored: integer
+    variables rounded, categorical ones as the index of a choice, fixed values appended.
     """
 
     variables: tuple[Variable, ...]  # the d searched variables

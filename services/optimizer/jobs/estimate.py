@@ -165,10 +165,7 @@ def checked_length(spec: Spec, cases: Sequence[Case], longest: float) -> float:
 
 
 class MeasuredRates:
-    """Simulated seconds per second on this machine, by kind of simulation. Thread-safe.
-
-    A rate is measured once and cached: forms ask for estimates often.
-    """
+    """Simulated seconds per second on this machine, by kind of simulation. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

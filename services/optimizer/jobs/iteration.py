@@ -114,10 +114,7 @@ class Iteration:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """An iteration to be evaluated, stored before evaluation.
-
-    Every number in positions and state is finite; the state is stored as JSON.
-    """
+    """An iteration to be evaluated, stored before evaluation; every number in it is finite."""
 
     iteration: int
     positions: Floats  # (particles, d) in the variables' units

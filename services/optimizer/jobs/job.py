@@ -44,11 +44,7 @@ def weight(priority: int) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """Limits on the unfinished jobs of one owner; jobs without an owner count together.
-
-    A job is unfinished until it has succeeded, failed or been cancelled; its whole budget counts,
-    whatever part of it has been spent.
-    """
+    """Limits on the whole budgets of one owner's jobs that have not ended."""
 
     jobs: int
     seconds: float  # simulated time of all their simulations [s]

@@ -64,12 +64,7 @@ class LabelsChange(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Criteria of a job list; None for any.
-
-    Attributes:
-        robot: name, or `own` for any custom robot.
-        preference: name, or `own` for any other.
-    """
+    """Criteria of a job list; None for any, `own` for a custom robot or preference."""
 
     archived: bool | None = None
     robot: str | None = None

@@ -60,10 +60,7 @@ def unusable_url(url: str) -> str | None:
 
 
 def refused_url(url: str, hosts: Collection[str]) -> str | None:
-    """Return why this server does not send to a URL; None if it does.
-
-    A server must not be made to send requests to itself or into its own network.
-    """
+    """Return why a server sends nothing to a URL, as into its own network; None if it does."""
     if not hosts:
         return "notifications are disabled; set the server's GAITSWARM_WEBHOOK_HOSTS"
     reason = unusable_url(url)

@@ -43,11 +43,9 @@ def local_sample(
     samples: int,
     seed: int,
 ) -> LocalSample:
-    """Sample designs around one.
+    """Sample designs around one, within `radius` times the width of the bounds, and inside them.
 
-    Values are within `radius` times the width of the bounds on either side, and within the bounds.
-    A design outside its bounds is sampled on the side towards them. Larger samples extend smaller
-    ones.
+    Larger samples extend smaller ones.
     """
     varied = tuple(v for v in variables if _reaches_neighbours(v, radius))
     if not varied:
@@ -97,13 +95,10 @@ def usable_rows(values: Floats, failed: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def slopes_and_squares(
     sample: LocalSample, values: Floats, chosen: NDArray[np.bool_], weights: Floats
 ) -> tuple[Floats, Floats]:
-    """Fit logarithms of a scenario's objectives (n, M) over the chosen designs of a sample.
+    """Fit logarithms of a scenario's objectives (n, M) with each row of weights (1 + B, n).
 
-    The contribution of noise to squares is subtracted. NaN for too few designs.
-
-    weights: (1 + B, n) of the designs, a row for each fit.
-
-    Returns slopes and their squares (1 + B, d, M).
+    Returns slopes and their squares (1 + B, d, M), less the contribution of noise; NaN for too few
+    designs.
     """
     if chosen.sum() < least_samples(len(sample.varied)):
         nothing = np.full((len(weights), len(sample.varied), values.shape[1]), np.nan)
@@ -120,10 +115,7 @@ def slopes_and_squares(
 
 
 def sensitivity_index(sample: LocalSample, values: Floats, failed: NDArray[np.bool_]) -> float:
-    """Return the robustness index over scenarios of objectives (n, K, M); NaN if too few succeed.
-
-    Frobenius norm of the Jacobian of logarithms, root mean square over the scenarios.
-    """
+    """Return the root mean square over scenarios of the Jacobian's norm; NaN if too few succeed."""
     usable, weights = usable_rows(values, failed), np.ones((1, len(values)))
     squares = [
         slopes_and_squares(sample, values[:, k], usable[:, k], weights)[1].sum()
@@ -133,10 +125,7 @@ def sensitivity_index(sample: LocalSample, values: Floats, failed: NDArray[np.bo
 
 
 def _regressions(x: Floats, y: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Slopes (1 + B, d, M) by least squares with each row of weights, and their variances.
-
-    x: (n, 1 + d) with a column of ones; y: (n, M).
-    """
+    """Slopes (1 + B, d, M) and variances by least squares; x (n, 1 + d) has a column of ones."""
     n, p = x.shape
     gram = (weights @ (x[:, :, None] * x[:, None, :]).reshape(n, -1)).reshape(-1, p, p)
     moments = (weights @ (x[:, :, None] * y[:, None, :]).reshape(n, -1)).reshape(len(gram), p, -1)

@@ -221,13 +221,7 @@ class Spec(BaseModel):
         return self
 
     def start_positions(self) -> Floats:
-        """Return the (k, d) start positions; none while earlier jobs are not looked up yet.
-
-        Raises:
-            ValueError: A start design does not fit the job, or they exceed the budget; names the
-            design
-                and the variable. Never for a validated spec.
-        """
+        """Return the (k, d) start positions; none while earlier jobs are not looked up yet."""
         if isinstance(self.start, EarlierJobs) or not self.start:
             return np.empty((0, 0))
         if len(self.start) > self.budget:

@@ -193,9 +193,8 @@ def walk_keys(
 ) -> tuple[bytes, ...]:
     """Return the cache keys of designs' outcomes in all cases of a job.
 
-    A key is a digest of all that an outcome depends on: the simulated design by name, the spec
-    without its `outcome_independent_fields`, and the provenance. It depends neither on the order of
-    variables nor on whether a variable is searched or fixed.
+    A key is a digest of the design by name, the spec without its `outcome_independent_fields`, and
+    the provenance.
     """
     names = spec.design_space().names
     order = sorted(range(len(names)), key=names.__getitem__)
@@ -219,11 +218,7 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Coordination:
-    """State of one run of one job. Immutable.
-
-    The optimizer is not stored: it is created from the stored ask when needed, so that continuing
-    and resuming follow the same path.
-    """
+    """State of one run of one job. Immutable; the stored ask creates the optimizer if needed."""
 
     backoff: Backoff = field(default_factory=Backoff)
     phase: Phase = Phase.START

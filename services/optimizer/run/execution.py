@@ -68,11 +68,7 @@ _log = logging.getLogger(__name__)
 
 
 class Heartbeat:
-    """Renews a claim from its own thread, inside the `with` block.
-
-    An unavailable store is retried indefinitely: it rejects writes under a claim that another
-    runner has taken over meanwhile.
-    """
+    """Renews a claim from its own thread, inside the `with` block; retries indefinitely."""
 
     def __init__(
         self,

@@ -70,10 +70,7 @@ def _cached(
 
 
 class Journal:
-    """Evaluates the requests of a claimed job, without what an earlier run of it has stored.
-
-    Used by the job's thread, except for `store_finished`.
-    """
+    """Evaluates the requests of a claimed job, without what an earlier run of it has stored."""
 
     def __init__(
         self,

@@ -75,11 +75,7 @@ class Backoff:
 
 
 def is_infrastructure(error: BaseException) -> bool:
-    """Return whether an error is caused by the machine, its resources or services.
-
-    Such an error is independent of the job, so the work is retried. Any other error is the job's
-    own fault or a bug, and would recur.
-    """
+    """Return whether an error is caused by the machine or its services, so that work is retried."""
     return any(_is_transient(link) for link in _causes(error)) or (
         isinstance(error, KernelBuildError)
         and (
@@ -106,13 +102,7 @@ def _is_transient(error: BaseException) -> bool:
 
 
 class Outage:
-    """Availability of a service. Thread-safe.
-
-    failed("refused")                  ->  True: the first failure, to be logged
-    attempted(); failed("refused")     ->  False
-    ended()                            ->  seconds since the first failure
-    ended()                            ->  None
-    """
+    """Availability of a service, from the first failure to `ended`. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock

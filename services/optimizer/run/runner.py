@@ -1,8 +1,4 @@
-"""Runners, which claim jobs and run several concurrently
-
-A runner ends in one of two ways: `drain` lets every job commit its iteration in progress, `stop`
-drops it. Both return the jobs to the queue, where another runner can claim them at once.
-"""
+"""Runners, which claim jobs, run several concurrently and return them to the queue at their end"""
 
 from __future__ import annotations
 

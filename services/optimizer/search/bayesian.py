@@ -155,10 +155,7 @@ def _steps(space: Space, parents: Floats, width: float, random: RandomNumbers) -
 
 
 def normal_scores(fitness: Floats) -> Floats:
-    """Return the quantiles of a normal distribution at the ranks; equal values have equal scores.
-
-    The model sees no magnitudes, so that failures and infeasible designs do not bend it.
-    """
+    """Return the quantiles of a normal distribution at the ranks: the model sees no magnitudes."""
     require_room_for_scipy()
     from scipy.special import ndtri  # noqa: PLC0415 - slow to import
 
@@ -264,10 +261,7 @@ def _matern(weights: list[float], squares: Iterable[Floats]) -> tuple[Floats, Fl
 
 
 def inverted(matrix: Floats) -> tuple[Floats, float]:
-    """Return the inverse of a positive definite matrix and the logarithm of its determinant.
-
-    Goodnight's sweep operator (1979).
-    """
+    """Invert a positive definite matrix, with log determinant (sweep, Goodnight 1979)."""
     swept, log_determinant = matrix.copy(), 0.0
     for i in range(len(swept)):
         pivot = float(swept[i, i])

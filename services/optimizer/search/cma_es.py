@@ -193,11 +193,7 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
 
 
 def _stagnates(bests: list[float]) -> bool:
-    """Return whether the latest third of the recent generations is no better than the first.
-
-    Compares best and median, as in Hansen's tutorial (2016, B.3) but over fewer generations. Only
-    the order of fitness values counts.
-    """
+    """Return whether the latest third of the generations is no better (2016, B.3)."""
     third = len(bests) // 3
     before, after = bests[:third], bests[-third:]
     return not any(of(after) < of(before) for of in (min, statistics.median_high))
@@ -454,11 +450,7 @@ class NormalDistribution:
         return border, np.abs(mean - border) / deviation, (value == 0.0) | (value == span)
 
     def _centred(self, y: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """Move integers of the better samples to the values that were evaluated.
-
-        Those with another value than the mean's move, and the others as far as keeps the average
-        (integer centring). Returns also (k,) whether an integer has another value in any of them.
-        """
+        """Move integers of the better samples to what was evaluated (integer centring)."""
         integers, count = self._integers, self._better_count
         span = self._space.span[integers]
         deviation = self.state.sigma * self.state.scale[integers] * span
@@ -477,11 +469,7 @@ class NormalDistribution:
         return centred, is_other.any(axis=0)
 
     def _keep_near_borders(self, before: Floats, mutated: NDArray[np.bool_]) -> None:
-        """Keep the mean of every integer within reach of a border.
-
-        before: distances to it before the update [standard deviations]; the distance to the only
-        border of a first or last value does not fall while no better sample has another value.
-        """
+        """Keep the mean of every integer within reach of a border."""
         require_room_for_scipy()
         from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
 

@@ -203,11 +203,7 @@ def pareto_ranks(vectors: Floats) -> Indices:
 
 
 class SampledHypervolume:
-    """The hypervolume that a front dominates, estimated from random points.
-
-    The front is scaled to [0, 1] in each objective; the box ends at the reference point, a tenth
-    beyond.
-    """
+    """The hypervolume that a front dominates, estimated from random points in its scaled box."""
 
     def __init__(self, front: Floats, samples: int, random: RandomNumbers) -> None:
         """Draw the points."""
@@ -243,10 +239,7 @@ class SampledHypervolume:
 
 
 def _weights(size: int, going: int) -> NDArray[np.int64]:
-    """Return (size + 1,) weights of a point by the number of vectors that dominate it.
-
-    A point is lost only if all vectors that dominate it are removed.
-    """
+    """Return (size + 1,) weights of a point by the number of vectors that dominate it."""
     weights, chance = np.zeros(size + 1), 1.0
     for others in range(min(size, going)):
         weights[others + 1] = chance / (others + 1)

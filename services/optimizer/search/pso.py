@@ -144,11 +144,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
                 raise ValueError(f"{name}: expected those of {particles} particles")
 
     def _scattered(self) -> Floats:
-        """Sample uniform positions with small random velocities.
-
-        Small, because a fast swarm spends its first steps at the walls; not zero, because the
-        leader, or a swarm in which every member failed, would then stand still.
-        """
+        """Sample uniform positions with small random velocities: fast ones end at walls."""
         draws = self._draw(purpose=_SCATTER)
         space = self.space
         largest = min(_INITIAL_VELOCITY, self.settings.velocity_limit) * space.span
@@ -247,10 +243,7 @@ def ring(particles: int) -> Links:
 
 
 def random_informants(draws: Floats) -> Links:
-    """Link each particle with random ones (standard swarm of 2011, Clerc 2012).
-
-    A particle may be drawn twice, so the number of informants varies.
-    """
+    """Link each particle with random ones, some twice (standard swarm of 2011, Clerc 2012)."""
     particles, k = draws.shape
     every = np.arange(particles)
     informed = np.floor(draws * particles).astype(np.intp)

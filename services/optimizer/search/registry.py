@@ -130,10 +130,7 @@ _FEW_EVALUATIONS: Final = 250
 def chosen_method(
     settings: AutoSettings, space: Space, budget: int, *, starts: bool
 ) -> SearchSettings:
-    """Choose the method of a search by its variables and evaluations, and whether it has a start.
-
-    Near a start, the Gaussian process does not look far enough.
-    """
+    """Choose the method by variables, evaluations and whether a search has a start."""
     if space.dimension > _LARGEST_DIMENSION:
         return DeSettings(particles=settings.particles)
     if budget <= _FEW_EVALUATIONS and not starts:

@@ -57,10 +57,7 @@ Clock = Callable[[sa.Connection], datetime]
 
 
 def database_time(connection: sa.Connection) -> datetime:
-    """Return the time of the clock that all users of a database share.
-
-    A lease is written by one process and judged by another, whose own clock may be hours off.
-    """
+    """Return the time of the database's clock, as another process judges what this one writes."""
     if connection.dialect.name == "postgresql":
         # CURRENT_TIMESTAMP is the transaction's start, before any wait for a lock.
         now: datetime = connection.execute(sa.select(sa.func.clock_timestamp())).scalar_one()
@@ -87,10 +84,7 @@ def parse_url(text: str) -> sa.URL:
 
 
 class Observer(Protocol):
-    """Receives what a process does with a database, for metrics and traces.
-
-    Methods are called after the transaction, in its thread; they return at once.
-    """
+    """Receives what a process does with a database, after the transaction, in its thread."""
 
     def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:
         """A transaction has ended after some time [s], rolled back if there is an error."""
@@ -108,10 +102,7 @@ class Observer(Protocol):
 
 
 class Database:
-    """Connections to a database and their transactions. Thread-safe; connects when first used.
-
-    name: in messages, without password. path: of an SQLite file; None for a server.
-    """
+    """Connections to a database and their transactions. Thread-safe; connects when first used."""
 
     def __init__(self, url: str | sa.URL, *, for_migration: bool = False) -> None:
         """Prepare connections."""
@@ -294,11 +285,10 @@ def _enable_write_ahead_log(connection: sqlite3.Connection) -> None:
 
 
 class _OpenFile:
-    """Device and inode of an SQLite file and of its write-ahead log while connections are open.
+    """Device and inode of an SQLite file and of its log while connections are open.
 
-    SQLite removes the log with the last connection of all processes. As long as one is open both
-    files stay, also through checkpoints, VACUUM and a restored backup: another inode is another
-    file, in which nothing that is written here will be found.
+    As long as one is open both files stay: another inode is another file, in which nothing that is
+    written here will be found.
     """
 
     def __init__(self, path: Path, engine: sa.Engine) -> None:

@@ -73,11 +73,7 @@ def is_job_id(text: str) -> bool:
 
 
 def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
-    """Return the row of a job. Raises NotFound.
-
-    Every transaction that changes a job locks it first, so that two commands, or a command and a
-    commit, never act on the same state.
-    """
+    """Return the row of a job, locked until the transaction's end. Raises NotFound."""
     query = select(*COLUMNS)
     return _row(connection, job_id, query.with_for_update() if lock else query)
 

@@ -222,11 +222,7 @@ class CalibrationSpec(Spec):
         return Layout(tuple(cases), of_walk)
 
     def catalogue(self) -> tuple[Variable, ...]:
-        """Return all variables of the robot, the controllers and the gait.
-
-        Raises:
-            ValueError: Two of them have the same name.
-        """
+        """Return all variables of robot, controllers and gait, which have different names."""
         try:
             of_robot = robot_variables(self.robot_sources)
             of_walks = walk_variables(walk.controller for walk in self.walks)
@@ -261,10 +257,7 @@ class CalibrationSpec(Spec):
                 )
 
     def check_can_be_simulated(self) -> None:
-        """Check robots, drives and gaits at both ends of all bounds.
-
-        Designs with a searched gait may be out of reach, which their status reports.
-        """
+        """Check robots, drives and gaits, unless searched, at both ends of all bounds."""
         super().check_can_be_simulated()
         space, cases = self.design_space(), self._cases()
         of_robot = {variable.name for variable in robot_variables(self.robot_sources)}
@@ -362,11 +355,7 @@ class CalibrationSpec(Spec):
         return np.array([target.use == "fit" for target in self.targets])
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by their distances from fitted targets.
-
-        Fitness is the root mean square over fitted targets, in tolerances [1]; utilities are the
-        same over those that require a case, 0 if none does.
-        """
+        """Judge designs by the root mean square of their distances from fitted targets [1]."""
         differences = self.differences(self.simulated(objectives, failed))
         fitted, of_walk = self.fitted, self.layout().of_walk
         utilities = np.zeros(failed.shape)
@@ -383,9 +372,8 @@ class CalibrationSpec(Spec):
     def as_good_as(self, fitness: float) -> float:
         """Return the fitness at which the sum of squares over fitted targets is greater by 4.
 
-        Tolerances are read as standard deviations: two of them more in total is no evidence. If
-        even the best mean square exceeds 1, the tolerances are taken to be too small, and 4 is
-        multiplied by it.
+        Two standard deviations more in total are no evidence; if even the best mean square exceeds
+        1, 4 is multiplied by it.
         """
         square = fitness * fitness
         return math.sqrt(square + _NO_EVIDENCE * max(1.0, square) / int(self.fitted.sum()))

@@ -114,10 +114,7 @@ class IdentificationSpec(Spec):
         )
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the mean absolute error of currents (eq. 2.21) [A].
-
-        Utilities are means over `links`, fitness is the mean over walks.
-        """
+        """Judge designs by the mean absolute error of currents over walks (eq. 2.21) [A]."""
         columns = [link - 1 for link in self.links]
         means = [
             [math.fsum(walk) / len(columns) for walk in design]

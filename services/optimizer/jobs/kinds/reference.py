@@ -93,10 +93,7 @@ def adapted_to_job(published: Mapping[str, float], spec: JobSpec) -> dict[str, f
 
 
 def nearest_design(spec: JobSpec, design: Mapping[str, float]) -> dict[str, float | str] | None:
-    """Return the design of a job that is nearest to a reference; None if there is none.
-
-    A gait that the reference leaves to the scenario is that of the first one.
-    """
+    """Return the design nearest to a reference, with the first scenario's gait, or None."""
     gait, nearest = spec.resolved_scenarios()[0].model_dump(), dict[str, float | str]()
     for variable in spec.design_space().variables:
         value = design.get(variable.name, gait.get(variable.name))

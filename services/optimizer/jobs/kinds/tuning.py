@@ -273,9 +273,8 @@ class JobSpec(WalksSpec):
     def with_gait_searched(self) -> JobSpec:
         """Return the job with chapter 3's gait variables searched as well, unless fixed.
 
-        A cycle time in which the scenarios differ stays theirs: it makes them fast or slow. If
-        constraints are relative to a reference, from which the job starts, bounds include the
-        scenarios' own gait, in which the reference walks.
+        A cycle time in which the scenarios differ stays theirs; bounds include the scenarios' own
+        gait if the job starts from references of constraints.
         """
         space, scenarios = self.design_space(), self.resolved_scenarios()
         relative = any(constraint.relative_to is not None for constraint in self.constraints)
@@ -291,11 +290,7 @@ class JobSpec(WalksSpec):
         return JobSpec.model_validate(document)
 
     def check_can_be_simulated(self) -> None:
-        """Check that the controller compiles and that the legs reach their feet's paths.
-
-        Designs with a searched gait may be out of reach, which their status reports. Only a
-        scenario whose gentlest gait is out of reach is rejected.
-        """
+        """Check that the controller compiles and that scenarios' gentlest gaits are in reach."""
         super().check_can_be_simulated()
         space, scenarios = self.design_space(), self.resolved_scenarios()
         for design in space.corners():
@@ -413,9 +408,8 @@ class JobSpec(WalksSpec):
     ) -> Floats:
         """Return the fitness; for a multi-objective method f1 to f5 over all scenarios.
 
-        These depend on no preference, so neither does the path of such a search. With constraints,
-        every infeasible design has numbers beyond those of all feasible ones, increasing with its
-        violation: feasible designs dominate infeasible ones, and these compare by violation.
+        Infeasible designs have numbers beyond those of all feasible ones, increasing with the
+        violation.
         """
         feedback = fitness
         if METHODS[self.search.name].multi_objective:

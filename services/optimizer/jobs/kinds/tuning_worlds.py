@@ -42,10 +42,7 @@ ScenarioAggregate = Annotated[
 
 
 def other_measure(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return changed fields of a spec, of those that are not None.
-
-    The worst scenario has no weights: either choice replaces the other.
-    """
+    """Return changed fields that are not None; weights and `worst` replace each other."""
     changes = {name: value for name, value in fields.items() if value is not None}
     if changes.get("scenario_aggregate") == "worst":
         changes.setdefault("scenario_weights", {})

@@ -235,8 +235,7 @@ Floats = NDArray[np.float64]
 class CalibrationWalk:
     """A case whose designs are robots and conventions, with one drive in one scenario.
 
-    Desired angles are those of the robot as described: its controller does not know the varied
-    parameters. Variables that the drive gives are not varied.
+    Desired angles are those of the robot as described.
     """
 
     name: str  # unique in its job

@@ -30,14 +30,8 @@ CreateCase = Callable[[Any, Walk], Case]
 class CaseFamily:
     """A kind of cases, each of which evaluates designs in place of a walk.
 
-    Attributes:
-        settings: Model of its settings.
-        summary: Description for users.
-        create: Makes a case for a walk.
-        libraries: Further distributions that it computes with; workers need them, and a job resumes
-            with the same versions only.
-        measurements: Columns of its outcomes' objectives after those of a walk: quantities that
-            are stored, and that constraints may name.
+    Workers need `libraries`; `measurements` are columns after a walk's objectives, which
+    constraints may name.
     """
 
     settings: type[CaseSettings]

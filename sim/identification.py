@@ -170,8 +170,7 @@ LINK_CURRENTS: Final = tuple(
 class CurrentFit:
     """A case whose designs are parameters of the robot; each repeats the recorded walk.
 
-    Desired angles are those of the robot as described: its controller does not know the true
-    parameters.
+    Desired angles are those of the robot as described.
     """
 
     name: str  # of the recorded walk, unique in its job
@@ -238,10 +237,7 @@ class CurrentFit:
 
 
 def recorded_currents(robot: Robot, states: Floats) -> Floats:
-    """Logged currents of DC motors in a walk, by the kernel's formula on whole columns.
-
-    Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
-    """
+    """Absolute currents of DC motors (T, J) [A] at control ticks, behind the sensors' low-pass."""
     parts, n = split_states(robot, states), robot.n_joints
     duty, rates = parts.duty, parts.joint_velocity
     if robot.has_backlash:

@@ -1,8 +1,4 @@
-"""Processes with limits, for work on untrusted input.
-
-Their program calls `serve`. Requests and answers are lines of JSON, so that no code comes back. A
-process is reused for the next request, unless it had to be killed.
-"""
+"""Processes with limits, for work on untrusted input, which comes and goes as lines of JSON"""
 
 from __future__ import annotations
 
@@ -30,10 +26,7 @@ _LONGEST_ANSWER: Final = 64 << 20
 
 
 class LimitedProcesses:
-    """Processes of one program with an address space of `memory` [B]. Thread-safe.
-
-    They start when needed, and end with this process, which closes their stdin.
-    """
+    """Processes of one program with an address space of `memory` [B]. Thread-safe."""
 
     def __init__(
         self,

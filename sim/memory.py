@@ -14,11 +14,7 @@ _WITH_OPENBLAS: Final = ("scipy.special._ufuncs", "scipy.linalg._fblas")
 
 
 def require_room_for_scipy() -> None:
-    """Check the address space before SciPy is imported.
-
-    If OpenBLAS cannot map its buffers while it is loaded, it retries forever. That blocks all
-    threads of the process, as it holds the interpreter's lock.
-    """
+    """Check the address space before SciPy is imported: without room OpenBLAS retries forever."""
     if sys.platform == "win32" or any(name in sys.modules for name in _WITH_OPENBLAS):
         return
     try:

@@ -13,10 +13,7 @@ from gaitswarm.sim.errors import SimulationInputError
 
 
 class Status(IntEnum):
-    """End of a simulation, a result like any other: a bad design is not an error.
-
-    Arrays and the kernel use the integer, people and JSON its `label`.
-    """
+    """End of a simulation, a result like any other: a bad design is not an error."""
 
     OK = 0
     DIVERGED = 1

@@ -1,8 +1,4 @@
-"""Provenance: everything that a case's outcome depends on besides the case and its designs.
-
-A job stores the provenance of its numbers, and every task returns that of its process, so that
-changes of robot files, code or compiler are noticed.
-"""
+"""Provenance: everything that a case's outcome depends on besides the case and its designs"""
 
 from __future__ import annotations
 
@@ -136,8 +132,5 @@ def simulator_files() -> tuple[Path, ...]:
 
 @lru_cache(maxsize=1)
 def simulator_digest() -> str:
-    """Return the digest of the source files of `sim` as of the first call.
-
-    A long-lived process calls it early, while the files are still those that it has imported.
-    """
+    """Return the digest of the source files of `sim`, as they were at the first call."""
     return source_digest(_ROOT, simulator_files())

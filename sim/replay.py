@@ -93,10 +93,7 @@ def ticks_at(rate: float, ticks: int) -> NDArray[np.int64]:
 def _placements(
     robot: Robot, links: tuple[str, ...], configurations: Floats
 ) -> tuple[Floats, Floats]:
-    """Forward kinematics: poses of links (F, B, 7) and positions of feet (F, L, 3) in the world.
-
-    `configurations` (F, 7+J) are position, quaternion x y z w, joints in the robot's order.
-    """
+    """Poses of links (F, B, 7) and positions of feet (F, L, 3) in the world at (F, 7+J)."""
     # Slow to import; a kernel from the cache does not need it.
     import pinocchio as pin  # noqa: PLC0415
 

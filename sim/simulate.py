@@ -189,10 +189,7 @@ def walking(
     physics_rate: int = PHYSICS_RATE,
     log: bool,
 ) -> Walking[Simulation]:
-    """Simulate setups by index of the design; designs without one are unreachable.
-
-    `kernel` is another engine's; else each setup has the robot's for its ground.
-    """
+    """Simulate setups by design index, by `kernel` or the robot's; others are unreachable."""
     coding, timestep = control_steps(robot, physics_rate)
     statuses = np.full(count, Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((count, N_OBJECTIVES), np.nan)

@@ -57,10 +57,7 @@ def confidence_interval(repeats: Sequence[Floats]) -> tuple[float, float]:
 
 
 def intensity(signal: Floats, timestep: float) -> float:
-    """Eq. 2.22: sqrt(mean |X| std X (max X - min X) mean |dX/dt|), a signal's liveliness.
-
-    dX/dt is the difference of neighbouring rows over the timestep [s].
-    """
+    """Eq. 2.22: sqrt(mean |X| std X (max X - min X) mean |dX/dt|), a signal's liveliness."""
     columns = _samples(signal).reshape(len(signal), -1)
     if len(columns) < 2:
         raise SimulationInputError("the intensity of a signal needs at least two samples")

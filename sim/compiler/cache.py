@@ -1,8 +1,6 @@
 """Cache of compiled libraries on disk: found only if intact, stored atomically, swept when unused.
 
-Every library has its SHA-256 in a file next to it, in the format of `sha256sum`. A truncated or
-modified library does not match and is rebuilt: loading it could kill the process or give wrong
-numbers silently.
+A library has its SHA-256 in a file next to it: loading a damaged one could give wrong numbers.
 """
 
 from __future__ import annotations

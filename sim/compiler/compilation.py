@@ -1,7 +1,6 @@
 """Compilation of C source to shared libraries, cached in the user's cache directory.
 
-A library is named by a hash of everything that went into it, so a stale one is never loaded; for
-damaged ones see `sim.compiler.cache`. A library built beforehand and installed with the package
+A library is named by a hash of everything that went into it. One that is installed with the package
 saves the compilation, or the compiler.
 """
 

@@ -28,10 +28,8 @@ _DECIMALS: Final = 9
 def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Floats:
     """Feed-forward of a walk (T, J) [N m]: the feet on the ground share the robot's weight evenly.
 
-    tau = -J^T (0, 0, f), with f the weight per foot on the ground and J the Jacobian at the desired
-    angles: the static part of the feed-forward of Di Carlo et al. (Dynamic locomotion in the MIT
-    Cheetah 3 through convex model-predictive control, 2018), without its optimization. The body is
-    taken as level; loads, unknown to the robot, are ignored.
+    tau = -J^T (0, 0, f), the static part of that of Di Carlo et al. (Dynamic locomotion in the MIT
+    Cheetah 3 through convex model-predictive control, 2018); the body is level, without load.
     """
     angles = trajectory.angles
     height, slopes = np.empty((len(angles), len(robot.legs))), np.empty_like(angles)

@@ -1,9 +1,7 @@
-"""Gaits by name, and each leg's part of a gait.
+"""Gaits by name, and each leg's part of a gait: its *lag*, a share of the cycle.
 
-A gait is the order of footfalls: by leg the *lag*, the share of the cycle by which its foot touches
-down after the first one (Hildebrand 1965, "Symmetrical gaits of horses", Science 150; 1989, "The
-quadrupedal gaits of vertebrates", BioScience 39). The feet on the ground at any time also depend on
-the scenario's duty factor.
+A foot touches down by its lag after the first one (Hildebrand 1965, "Symmetrical gaits of horses",
+Science 150; 1989, "The quadrupedal gaits of vertebrates", BioScience 39).
 """
 
 from __future__ import annotations

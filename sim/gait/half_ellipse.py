@@ -11,11 +11,7 @@ Floats = NDArray[np.float64]
 def half_ellipse(
     phase: Floats, *, stride: float, height: float, duty_factor: float
 ) -> tuple[Floats, Floats]:
-    """Foot position in its leg's frame [m] at phases (...) of the cycle.
-
-    It is forward, from +stride/2 to -stride/2 and back, and lift >= 0. duty_factor: support's share
-    of the cycle [1].
-    """
+    """Forward distance and lift [m] at phases (...); duty_factor is support's share [1]."""
     supporting = phase < duty_factor
     support = phase / duty_factor
     swing = np.pi * (phase - duty_factor) / (1.0 - duty_factor)

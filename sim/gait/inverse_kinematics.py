@@ -1,8 +1,4 @@
-"""Inverse kinematics of the legs.
-
-In closed form for the thesis's legs (appendix, eq. 4, misprints corrected), by Gauss-Newton steps
-for any other leg of three joints.
-"""
+"""Inverse kinematics: in closed form (appendix, eq. 4, misprints corrected), or by Gauss-Newton"""
 
 from __future__ import annotations
 
@@ -32,11 +28,9 @@ _EXACT: Final = 1e-14
 def leg_angles(
     lengths: tuple[float, float, float], forward: Floats, lateral: Floats, vertical: Floats
 ) -> tuple[Floats, Floats]:
-    """Knee-up solution for a tibia end (T,) relative to the coxa axis [m].
+    """Knee-up angles (T, 3) [rad] for a tibia end (T,) relative to the coxa axis [m].
 
-    Returns:
-        Angles (T, 3) [rad] (coxa forward, femur up, tibia up), and the miss (T,) [m] by which the
-        target lies outside the leg's reach, 0 inside; angles of a missed target point towards it.
+    Also the miss (T,) [m] by which it lies outside the leg's reach; angles then point towards it.
     """
     coxa, femur, tibia = lengths
     alpha = np.arctan2(forward, lateral)
@@ -54,13 +48,9 @@ def leg_angles(
 
 
 def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
-    """Angles of any other leg, on the branch of its stance, for feet (T, 3) in the body's frame.
+    """Angles of any other leg, on the branch of its stance, for feet (T, 3), and the miss.
 
-    Levenberg-Marquardt steps from the stance, first half of the way to the targets, so that a knee
-    does not flip.
-
-    Returns:
-        Angles (T, 3) [rad], of a missed target the closest ones, and the miss as in `leg_angles`.
+    Levenberg-Marquardt steps from the stance, first half of the way, so that a knee does not flip.
     """
     # Equal targets are solved once. However, numpy rounds a single row differently than several, so
     # equal rows of a constant target stay together.

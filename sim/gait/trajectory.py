@@ -92,10 +92,7 @@ path."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Desired angles at the control rate; arrays are read-only.
-
-    Legs that move alike share their columns.
-    """
+    """Desired angles at the control rate, read-only; legs that move alike share their columns."""
 
     columns: Floats  # (T, C) [rad]; row 0 is the pose at rest
     joints: NDArray[np.intp]  # column by joint, (J,)

@@ -34,10 +34,7 @@ class Past:
 
 
 def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
-    """Advance the filtered absolute currents (J,) [A] by one physics step.
-
-    smoothing is the share of the distance to `current` covered in the step [1]; 1 for no filter.
-    """
+    """Advance the filtered absolute currents (J,) [A] by a step, by a share of the distance."""
     return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
 
 
@@ -73,10 +70,7 @@ def status_of(
     setup: WalkSetup,
     knees: Floats | None = None,
 ) -> Status:
-    """Return the status at the end of a control tick; OK means that the walk continues.
-
-    `knees` are places (L, 3) [m] in the world, required on uneven ground.
-    """
+    """Return the status at the end of a tick; `knees` (L, 3) [m] are required on uneven ground."""
     if not all(np.isfinite(array).all() for array in (q, v, internal_state)):
         return Status.DIVERGED
     upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
@@ -102,10 +96,7 @@ _NO_PD: Final = JointPd()
 
 
 class InnerLoop:
-    """Commands to a robot's actuators from inner tick to inner tick.
-
-    DC motors keep the voltage of the control tick.
-    """
+    """Commands to actuators from inner tick to inner tick; DC motors keep their voltage."""
 
     def __init__(self, robot: Robot, setup: WalkSetup, coding: Coding) -> None:
         self._limit = robot.actuators().torque_limit if robot.is_torque_controlled else None

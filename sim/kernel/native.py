@@ -139,11 +139,7 @@ STRUCTURES: Final = {
 
 
 class Addresses:
-    """Addresses of contiguous arrays, which stay valid while this object lives.
-
-    Walks share most arrays: those of a scenario all but the control law, those of a design the
-    control law.
-    """
+    """Addresses of contiguous arrays, which stay valid while this object lives."""
 
     def __init__(self) -> None:
         self._arrays: dict[int, tuple[int, NDArray[Any], NDArray[Any]]] = {}
@@ -204,11 +200,7 @@ class Addresses:
 
 
 class Pool:
-    """Concurrent calls of one kernel and coding.
-
-    A thread first starts all walks of its own call. Lanes that then become free take walks of other
-    calls, so that all threads finish at nearly the same time.
-    """
+    """Concurrent calls of one kernel and coding, which take each other's walks into free lanes."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._library = library
@@ -279,11 +271,7 @@ class NativeKernel:
                 )
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """Compute all walks, `lanes` at a time, in the order of `plan_lanes`.
-
-        Concurrent calls without logs share their walks: a thread with free lanes takes over walks
-        of another call, and waits for those that others have taken over from it.
-        """
+        """Compute all walks, `lanes` at a time, in the order of `plan_lanes`; calls share walks."""
         for law in {id(s.control_law): s.control_law for s in setups}.values():
             check_gains(law, torque=self._torque)
         for setup in setups:
@@ -360,11 +348,7 @@ _registering: Final = threading.Lock()
 def native_kernel(
     robot: Robot, precision: Precision = "double", *, uneven: bool = False
 ) -> NativeKernel | None:
-    """Return the robot's kernel, compiled on first use and loaded once per process.
-
-    Robots that differ only in run-time parameters share a library. Other kernels can be loaded
-    while one is compiled.
-    """
+    """Return the robot's kernel, loaded once per process; robots may share a library."""
     identity = kernel_identity(robot, precision, uneven=uneven)
     with _registering:
         loading = _loading.setdefault(identity, threading.Lock())

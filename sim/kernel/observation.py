@@ -165,10 +165,7 @@ def sensed_currents(
 ) -> NDArray[np.float64]:
     """Return the inputs of the current sensors' converters: absolute currents behind the low-pass.
 
-    Currents [A] and voltages [V] are (T, J). The low-pass of `sensors.current_filter` (thesis
-    2.3.6.3) starts at zero. Between two control ticks the current is taken as linear: the duty, and
-    almost exactly the voltage, is constant there, so the line ends where the voltage jumps at the
-    next tick.
+    Between two ticks the current (T, J) [A] is linear; it ends where the voltage jumps.
     """
     begins = np.abs(current)
     smoothing = current_smoothing(robot.description.sensors.current_filter, CONTROL_PERIOD)

@@ -65,9 +65,8 @@ CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
 def internal_state_size(robot: Robot) -> int:
     """Return the length of a walk's internal state, which it carries besides q and v.
 
-    With backlash, angles [rad] and rates [rad/s] of the motors come first; then, with dry friction,
-    torques of its springs and torques last passed to the links [N m]; then the state of the contact
-    law, foot by foot.
+    First angles [rad] and rates [rad/s] of motors with backlash, then torques of dry friction's
+    springs and of links [N m], then the contact law's, foot by foot.
     """
     motors = 2 * robot.n_joints * (robot.has_backlash + robot.has_dry_friction)
     law = CONTACT_LAWS[robot.description.contact_law]
@@ -177,8 +176,7 @@ def pack_parameters(
 ) -> Floats:
     """Return the kernel's parameters for one robot in one scenario.
 
-    A load is a point mass at `load_height` over the body's centre. A jammed leg is held at its
-    angles in `start` (J,) [rad]. `displaced`: disturbances are angles [rad] instead of torques.
+    A jammed leg is held at its angles in `start` (J,) [rad]. `displaced`: disturbances are angles.
     """
     if displaced and not robot.has_backlash:
         raise SimulationInputError(

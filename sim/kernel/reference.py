@@ -1,9 +1,4 @@
-"""The Python driver: the same walk over CasADi's interpreter.
-
-It is the oracle of driver.c (control_tick.py of tick.c and control.c, sensors.py of sensors.c) and
-the fallback where there is no C compiler. The physics agrees to rounding, the integer arithmetic
-exactly.
-"""
+"""The Python driver, over CasADi's interpreter: the oracle of driver.c, and its fallback"""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Sensor errors before coding: white noise and delays.
-
-The Python twin of sensors.c, number by number.
-"""
+"""Sensor errors before coding: the Python twin of sensors.c, number by number"""
 
 from __future__ import annotations
 

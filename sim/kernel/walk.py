@@ -347,13 +347,7 @@ class KernelTime:
 def walk_together(
     walkings: Sequence[Walking[T]], kernel_time: KernelTime | None = None
 ) -> tuple[T, ...]:
-    """Run several computations concurrently; walks of one kernel and coding share one call.
-
-    walkings                        calls
-    a yields x1, x2; b yields y1    kernel.walk(x1, x2, y1)
-    a returns; b yields y2          kernel.walk(y2)
-    b returns                       -
-    """
+    """Run several computations concurrently; walks that they yield for one kernel share a call."""
     results: dict[int, T] = {}
     answers: dict[int, Sequence[WalkResult] | None] = dict.fromkeys(range(len(walkings)))
     while answers:

@@ -27,12 +27,7 @@ class Drive:
 
 
 class DryFriction:
-    """Dry friction in numbers: the torque that would stop a joint, within its limit.
-
-    Attributes:
-        torques: on the joints in the last step (J,) [N m].
-        loads: passed to the links in the last step (J,) [N m].
-    """
+    """Dry friction in numbers: the torque that would stop a joint, within its limit."""
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
         self._numbers = [numbers[name] for name in DRY_FRICTION]
@@ -79,11 +74,7 @@ class TorqueMotors:
 
 
 class DcMotors:
-    """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
-
-    numbers: `viscous`, `DRY_FRICTION`, `supply_voltage` and `supply_resistance`, as in
-    `sim.kernel.parameters.Layout`.
-    """
+    """Quasi-static currents on a battery of finite resistance (thesis 2.2.5)."""
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
         self._k, self._r = actuators.torque, actuators.resistance

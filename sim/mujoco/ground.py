@@ -50,10 +50,7 @@ class Ground(ABC):
     def friction(
         self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
     ) -> tuple[Floats, Floats]:
-        """Return forces along the ground (L, 2) [N], and the memory after the step.
-
-        limit: mu F_z (L,) [N]. slip: velocities along the ground (L, 2) [m/s].
-        """
+        """Return forces along the ground (L, 2) [N] up to `limit`, and the memory after it."""
 
 
 class LinearZone(Ground):
@@ -99,9 +96,7 @@ class DeadZone(Ground):
 class Stick(Ground):
     """A spring and damper along the ground that slips where it would pull more than mu F_z.
 
-    Its memory (L, 2) is the springs' elongation along the world's axes [m]: it grows by the step's
-    motion before it pulls, shrinks in proportion to the reduced pull of a slipping foot, and
-    vanishes at lift-off.
+    Its memory (L, 2) is the springs' elongation along the world's axes [m], 0 after lift-off.
     """
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:

@@ -81,11 +81,7 @@ class WalkStopped(Exception):
 
 
 class MujocoKernel:
-    """Walks in MuJoCo.
-
-    A constant rate of steps [Hz] can be given, a multiple of the control rate; by default it is
-    `RATE` or `BACKLASH_RATE`, and higher if a foot may touch down.
-    """
+    """Walks in MuJoCo, at a given rate of steps [Hz] or at `RATE`, `BACKLASH_RATE` or more."""
 
     backend: Final = "mujoco"
     lanes: Final = 1
@@ -227,10 +223,7 @@ class _Stepper:
         return np.asarray(self._d.xpos[self._feet])
 
     def _on_ground(self) -> tuple[Floats, Floats, Floats | None]:
-        """Positions and velocities of the feet in the ground's axes, and these axes (L, 3, 3).
-
-        Heights are distances from the ground; axes are None for those of the world.
-        """
+        """Positions and velocities of the feet in the ground's axes, and these axes (L, 3, 3)."""
         position, velocity = self._of_feet
         if self._terrain is None:
             return position, velocity, None

@@ -106,12 +106,10 @@ def _pair(
 
 
 def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
-    """Write a robot in a scenario as MJCF for MuJoCo's viewer.
+    """Write a robot in a scenario as MJCF for MuJoCo's viewer, with the pose at its start.
 
-    It has the scenario's load, slope and terrain, joints with the motors' voltages [V] as controls
-    (torques [N m] if torque-controlled), visible shapes, and a keyframe `start`, the pose at the
-    beginning of a walk through the scenario. Backlash, limits of torque by speed, the battery's sag
-    and, of dry friction, all but `coulomb_friction` are omitted.
+    Backlash, limits of torque by speed, the battery's sag and, of dry friction, all but
+    `coulomb_friction` are omitted.
     """
     require_reachable(robot, scenario)
     surroundings = Surroundings.of(robot, scenario)

@@ -1,8 +1,4 @@
-"""Size limits for the text of a robot's files, checked before parsing.
-
-The text is untrusted. Each check reads it once in linear time, so that costly input (deep nesting,
-long chains, entity expansion) is rejected before it is parsed.
-"""
+"""Size limits for the untrusted text of a robot's files, checked in linear time before parsing"""
 
 from __future__ import annotations
 

@@ -297,10 +297,7 @@ class RobotDescription(Data):
 
     @property
     def output(self) -> tuple[int, int, float]:
-        """Full scale and resolution of a controller's output [counts], and the value of a count.
-
-        The value is motor voltage per supply voltage, or torque per torque limit [1].
-        """
+        """Full scale and resolution of a controller's output [counts], and a count's value [1]."""
         if self.pwm is None or self.supply.nominal_voltage is None:
             command = self.torque_command or _DEFAULT_COMMAND
             return command.counts, command.step, 1.0 / command.counts

@@ -51,10 +51,6 @@ def parallel_axis(offset: Floats) -> Floats:
 
 
 def product(rotation: Floats, other: Floats) -> Floats:
-    """Multiply a rotation (3, 3) by (3,) or (3, 3), rounding alike on every machine.
-
-    NumPy's `@` calls a BLAS library, whose summation depends on the processor: a robot's inertias,
-    and all simulations with them, would differ in their last bits.
-    """
+    """Multiply a rotation (3, 3) by (3,) or (3, 3), rounding alike on every machine."""
     x, y, z = (np.multiply.outer(rotation[:, k], other[k]) for k in range(3))
     return np.asarray(x + y + z)

@@ -121,11 +121,7 @@ def is_torque_controlled(joint: LimbJoint) -> bool:
 
 
 def electrical_constants(joints: Sequence[LimbJoint]) -> list[float]:
-    """Return what the battery voltage depends on: two numbers by joint.
-
-    First the conductance of DC motors [1/ohm] or R / k^2 of others [W/(N m)^2]; then r K_M [N m/A]
-    or the torque limit [N m].
-    """
+    """Return by joint 1/R [1/ohm] or R / k^2 [W/(N m)^2], and r K_M [N m/A] or the torque limit."""
     if is_torque_controlled(joints[0]):
         loss = [joint.resistance * joint.inverse_torque * joint.inverse_torque for joint in joints]
         return [*loss, *(joint.torque_limit for joint in joints)]

@@ -42,10 +42,7 @@ def leg_points(robot: Robot, joints: Floats) -> Floats:
 
 
 def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[Floats, Floats]:
-    """Return feet (T, L, 3) and centre of mass (T, 3) in the body's frame [m].
-
-    `joints` are angles (T, J) [rad], `load` is carried on the body [kg].
-    """
+    """Return feet (T, L, 3) and centre of mass (T, 3) in the body's frame [m], with a load [kg]."""
     body = robot.body
     at_load = np.array([0.0, 0.0, robot.description.load_height])
     moment = np.tile(body.mass * body.centre + load * at_load, (len(joints), 1))
@@ -84,10 +81,7 @@ def _turn(axis: Floats, angle: float) -> Floats:
 def resting_height(
     robot: Robot, joints: Floats, weight: float, grid: HeightGrid | None = None
 ) -> float:
-    """Return the height [m] of a level body at which the feet's springs carry a weight [N].
-
-    The body stands over the origin; `grid` are the heights of the ground.
-    """
+    """Return the height [m] of a level body on a grid at which its feet's springs carry it."""
     contacts = robot.contacts()
     reach = np.array([c.sole for c in contacts]) - feet_below_body(robot, joints)
     if grid is not None:
@@ -99,9 +93,7 @@ def resting_height(
 def height_on_soles(reach: Floats, stiffness: Floats, weight: float) -> float:
     """Return the height [m] of a body at which springs below it carry a weight [N].
 
-    The force is piecewise linear in height; feet are loaded from the lowest up until the next one
-    stays in the air. `reach` is how far the unloaded soles lie below the body, (L,) [m], and
-    `stiffness` theirs, (L,) [N/m].
+    The lowest feet, `reach` below (L,) [m], are loaded until the next one stays in the air.
     """
     order = np.argsort(-reach)
     reach, stiffness = reach[order], stiffness[order]

@@ -263,12 +263,7 @@ _NONE: Final = 1e-9
 
 
 def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
-    """Yield warnings about masses and inertias that are physically impossible, one for equal ones.
-
-    Links that are fixed to one another are simulated as one body: placeholder moments of a camera
-    do not matter on a trunk with its own. If the whole is impossible, its impossible
-    links are named.
-    """
+    """Yield warnings about impossible masses and inertias of links fixed to one another."""
     parts: dict[str, list[str]] = {name: [] for name in urdf.bodies}
     for link, place in urdf.places.items():
         parts[place.body].append(link)

@@ -281,7 +281,7 @@ def _reason_for_new_search(parent: AnySpec, changed: Sequence[str]) -> str:
 def _search_state(
     parent: Parent, spec: AnySpec, rejudged: Floats | None, until: float
 ) -> dict[str, Any]:
-    """Return the optimizer's dump after the last ask taken over, told `rejudged` (r,) if given."""
+    """Return the optimizer's dump after the last ask taken over, by `rejudged` (r,) if given."""
     positions, feedback = (
         parent.positions(),
         parent.feedback(parent.job.spec, parent.columns.fitness),

@@ -1,7 +1,4 @@
-"""Ground contact of a point foot and its friction laws, as symbols (thesis 2.2.6).
-
-Inputs and internal state of the laws, as data: `sim.kernel.parameters.CONTACT_LAWS`.
-"""
+"""Ground contact of a point foot and its friction laws, as symbols (thesis 2.2.6)"""
 
 from __future__ import annotations
 
@@ -165,10 +162,7 @@ def karnopp(
 def stick(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> Reaction:
-    """Spring and damper along the ground from the touchdown point, saturated at mu F_z.
-
-    The internal state is the spring's elongation along the world's x and y [m].
-    """
+    """Spring and damper along the ground from the touchdown point, saturated at mu F_z."""
     k, c = ground["stick_stiffness"], ground["stick_damping"]
     stretched, pull = [], []
     for axis, elongation in zip((foot.ahead, foot.left), internal_state, strict=True):

@@ -20,10 +20,7 @@ from gaitswarm.sim.robot.limbs import LimbJoint, is_torque_controlled
 def shaft_torque(
     ahead: Scalar, rate: Scalar, play: Scalar, stiffness: float, damping: float
 ) -> Scalar:
-    """Torque of a stiff, damped shaft on the link [N m]; it pushes, but never pulls into the play.
-
-    `ahead` is the motor side's angle minus the link's [rad], `play` is from end to end [rad].
-    """
+    """Torque of a stiff, damped shaft on the link [N m], which never pulls into the play [rad]."""
     half = 0.5 * play
     drag = damping * rate
     forward = ca.fmax(stiffness * (ahead - half) + drag, 0.0) * (half < ahead)

@@ -15,12 +15,10 @@ def supply_voltage(
     source: Scalar,
     internal: Scalar,
 ) -> Scalar:
-    """Voltage of one battery of finite resistance under quasi-static motor currents [V].
+    """Supply voltage [V] of one battery of finite resistance under quasi-static motor currents.
 
-    The bridges conserve power, so the battery's current is sum(duty_j I_j); with I_j = (duty_j U_S
-    - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S (thesis 2.2.5). The
-    electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static. Rates are those
-    at the gearheads' outputs [rad/s], torque is r K_M [N m/A].
+    The bridges conserve power: the battery's current is sum(duty_j I_j), I_j = (duty_j U_S - k_j
+    omega_j) / R_j, so U_S = V - R_i sum(duty_j I_j) is linear in U_S (thesis 2.2.5).
     """
     back, load = 0.0, 0.0
     for share, rate, k, g in zip(duty, rates, torque, conductance, strict=True):

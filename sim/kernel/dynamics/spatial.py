@@ -167,11 +167,7 @@ def mapped(tree: T, function: Callable[[Scalar], Scalar]) -> T:
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """Rotation from a link's frame to the preceding frame: about the joint's axis, then `rest`.
-
-    A rotation about one of the frame's own axes mixes only two components; most joints have such
-    axes.
-    """
+    """Rotation from a link's frame to the preceding frame: about the joint's axis, then `rest`."""
 
     rest: Matrix  # rotation at angle zero
     axis: Vector  # constant unit axis in the link's frame
@@ -222,9 +218,7 @@ def _from(i: int) -> tuple[int, int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """Articulated inertia in a link's frame: force = linear a + coupling alpha, moment = coupling^T
-    a + angular alpha.
-    """
+    """Articulated inertia in a link's frame: force = A a + C alpha, moment = C^T a + B alpha."""
 
     linear: Matrix  # [kg]
     coupling: Matrix  # [kg m]

@@ -1,8 +1,4 @@
-"""A physics step in pieces: C functions of the body and of each kind of limb.
-
-Limbs of one kind share a function called in a loop; their differences are data. The machine code is
-then as large as one limb and stays in the first-level caches.
-"""
+"""A physics step in pieces: C functions of the body and of each kind of limb, called in a loop"""
 
 from __future__ import annotations
 

@@ -305,6 +305,7 @@ def init_robot(
     locks: Mapping[str, float] = MappingProxyType({}),
     feet: Mapping[str, Sequence[float]] = MappingProxyType({}),
     mass: float | None = None,
+    actuators: Mapping[str, str] = MappingProxyType({}),
 ) -> MadeRobot:
     """Make a robot's folder from a URDF, xacro or MJCF file.
 
@@ -319,6 +320,7 @@ def init_robot(
         locks: Angles of joints to hold [rad], by name with wildcards.
         feet: Ends of legs in the frame of a link there [m], (3,), by name with wildcards.
         mass: Of the robot [kg]; default: the file's, unless it is a placeholder.
+        actuators: Names of listed actuators by joint, with wildcards; the last match counts.
     """
     source, folder = Path(urdf), Path(output)
     check_new(folder)
@@ -344,7 +346,7 @@ def init_robot(
         urdf_text, left_out_parts = as_urdf(text, source, package_folder, arguments)
         if urdf_text is not text:
             file = f"{file} as a URDF"
-        hints = LegHints(locks, feet, bounds, mass)
+        hints = LegHints(locks, feet, bounds, mass, actuators)
         proposal = walking_proposal(urdf_text, chosen, actuator, frame, hints)
         proposal = proposal.with_guesses(left_out_parts)
     except RobotFileError as error:
@@ -495,6 +497,13 @@ class RobotDraftRequest(Request):
         le=10_000.0,
         description="Mass of the robot [kg]; null for the text's, unless that is a placeholder.",
     )
+    actuators: dict[str, str] = Field(
+        default_factory=dict,
+        max_length=MOST_LINKS,
+        description="Listed actuators by joint, with the wildcards * and ?; of several that match"
+        " the last. Then `actuator` is not used. Names: `gaitswarm robot init --help`.",
+        examples=[{"*": "mx64", "*_coxa": "mx106"}],
+    )
 
 
 class RobotDraftView(View):
@@ -519,7 +528,9 @@ def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
     check_name(name)
     frame = frame_of(request.up, request.forward)
     with simulation_errors("urdf"):
-        hints = LegHints(request.locks, request.feet, mass=request.mass)
+        hints = LegHints(
+            request.locks, request.feet, mass=request.mass, actuators=request.actuators
+        )
         made = propose_apart(request.urdf, name, request.actuator, frame, hints)
     return RobotDraftView(
         name=name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.notes)

@@ -18,6 +18,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 if TYPE_CHECKING:
     from gaitswarm.cli.gaits import GaitsView, GaitView
     from gaitswarm.robots import MadeRobot, RobotCheckView
+    from gaitswarm.sim.proposal.drive import ActuatorChoice
     from gaitswarm.sim.robot import RobotFiles
 
 _LISTED: Final = 5
@@ -41,13 +42,16 @@ def init(
         str | None, typer.Option(help="Name of the robot [default: the URDF's, else the file's].")
     ] = None,
     actuator: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
-            metavar="auto|dc|torque",
+            metavar="auto|dc|torque|[JOINT=]NAME",
             help="Actuators: DC motors with gearheads, or torque-controlled; auto decides by the"
-            " URDF's torques and rates.",
+            " URDF's torques and rates. Or a servo by name, for all joints or those with the"
+            " wildcards * and ?; repeatable, and the last match counts: mx64, mx106, xl320,"
+            " xl330, sts3215, erob80-50, erob80-100, mg996r, ds3218, mini-cheetah [default:"
+            " auto].",
         ),
-    ] = "auto",
+    ] = None,
     up: Annotated[
         str | None,
         typer.Option(
@@ -114,14 +118,14 @@ def init(
     pip install 'gaitswarm[xacro]', MJCF 'gaitswarm[mujoco]'.
     """
     from gaitswarm.robots import init_robot
-    from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
     from gaitswarm.sim.proposal.frame import AXES
 
+    kind, actuators = _actuators(actuator or [])
     created = init_robot(
         urdf,
         output,
         name=name,
-        actuator=one_of(ACTUATOR_CHOICES, actuator, "actuator"),
+        actuator=kind,
         up=None if up is None else one_of(AXES, up, "up"),
         forward=None if forward is None else one_of(AXES, forward, "forward"),
         meshes=meshes,
@@ -139,6 +143,7 @@ def init(
             for link, at in (name_and_value(e, "foot", "LINK=X,Y,Z") for e in foot or [])
         },
         mass=mass,
+        actuators=actuators,
     )
     left_out = [{"name": name, "problem": why} for name, why in created.left_out.items()]
     document = {
@@ -148,6 +153,23 @@ def init(
         "meshes": {"copied": created.copied, "left_out": left_out},
     }
     return document, _created(created, output)
+
+
+def _actuators(entries: list[str]) -> tuple[ActuatorChoice, dict[str, str]]:
+    """Split the option into a kind and names by joint."""
+    from gaitswarm.sim.near_names import instead_of
+    from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
+    from gaitswarm.sim.robot.library import listed_actuators
+
+    for choice in ACTUATOR_CHOICES:
+        if entries in ([], [choice]):
+            return choice, {}
+    known = [*ACTUATOR_CHOICES, *listed_actuators()]
+    for name in (entry.rpartition("=")[2].strip() for entry in entries):
+        if name not in known[len(ACTUATOR_CHOICES) :]:
+            raise InvalidRequest(f"{name!r}: {instead_of(name, known)}", field="actuator")
+    of_joints = [e if "=" in e else f"*={e}" for e in entries]
+    return "auto", dict(name_and_value(e, "actuator", "JOINT=NAME") for e in of_joints)
 
 
 def numbers_of(text: str, count: int, option: str) -> list[float]:

@@ -244,7 +244,7 @@ def propose_robot(
         replace(leg, stance=np.array(angles))
         for leg, angles in zip(legs, stance.angles, strict=True)
     ]
-    drives = propose_drives(tree, joints, legs, stance)
+    drives = propose_drives(tree, joints, legs, stance, hints.actuators)
     kind = chosen_kind(actuator, drives)
     sole, sole_note = propose_sole(tree, legs, stance, [leg.end.sole for leg in found.legs])
     toml = "\n".join(
@@ -267,10 +267,10 @@ def propose_robot(
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.end.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes += [
-        ACTUATOR_NOTES[kind],
+        *([] if hints.actuators else [ACTUATOR_NOTES[kind]]),
         f"feet stand {stance.height:.3g} m below the hips, at {height:.0%} of the legs' reach",
         f"soles are {sole.length:g} m long: {sole_note}",
-        _ELSE,
+        _ELSE.replace("rotors, ", "") if hints.actuators else _ELSE,
     ]
     notes += found.notes
     made = Proposal(toml + "\n", text, job, (), tuple(unphysical(tree, text)))
@@ -428,9 +428,9 @@ def propose_apart(
     """
     check_urdf(text)
     request = {"text": text, "name": name, "actuator": actuator, "frame": asdict(frame)}
-    guidance = {"locks": dict(hints.locks), "feet": dict(hints.feet), "mass": hints.mass}
+    guidance = {name: getattr(hints, name) for name in ("locks", "feet", "mass", "actuators")}
     try:
-        made = PROCESSES.ask(request | guidance)
+        made = PROCESSES.ask(request | {"hints": guidance})
     except ProcessEnded as error:
         raise RobotFileError(
             f"robot.urdf: cannot propose a robot.toml: this {error}; write one by hand, as"
@@ -450,7 +450,7 @@ def _answer(request: Document) -> Document:
         request["name"],
         request["actuator"],
         Frame(**request["frame"]),
-        LegHints(request["locks"], request["feet"], mass=request["mass"]),
+        LegHints(**request["hints"]),
     )
     return asdict(made.with_guesses(left_out))
 

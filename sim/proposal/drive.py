@@ -6,16 +6,19 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
+from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
-from gaitswarm.sim.robot.actuators import ActuatorKind
+from gaitswarm.sim.robot.actuators import ActuatorKind, DryFriction
 from gaitswarm.sim.robot.elements import Joint
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.library import ListedActuator, listed_actuator
 from gaitswarm.sim.robot.urdf import Urdf
 
 _ENOUGH, _PLAUSIBLE = 2.0, 60.0
@@ -59,6 +62,7 @@ class DriveNumbers:
     armature: float  # of the rotor at the joint [kg m2]
     note: str  # source of the numbers
     believed: bool = False  # whether torque and speed are the URDF's
+    listed: str | None = None  # name in the library of actuators
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +75,16 @@ class SoleNumbers:
 
 
 def propose_drives(
-    urdf: Urdf, names: Sequence[Sequence[str]], legs: Sequence[ChainLeg], stance: Stance
+    urdf: Urdf,
+    names: Sequence[Sequence[str]],
+    legs: Sequence[ChainLeg],
+    stance: Stance,
+    actuators: Mapping[str, str],
 ) -> list[list[DriveNumbers]]:
-    """Propose a drive for every joint, by leg."""
+    """Propose a drive for every joint, by leg: those of the library, if there are any."""
     joints = {joint.name: joint for joint in urdf.joints}
+    if actuators:
+        return _listed_drives(names, actuators)
     force = urdf.total_mass * GRAVITY / (len(legs) / 2.0)
     needs = []
     for leg, angles in zip(legs, stance.angles, strict=True):
@@ -92,7 +102,46 @@ def propose_drives(
     ]
 
 
+def _listed_drives(
+    names: Sequence[Sequence[str]], actuators: Mapping[str, str]
+) -> list[list[DriveNumbers]]:
+    def drive_of(joint: str) -> DriveNumbers:
+        matches = [name for pattern, name in actuators.items() if fnmatchcase(joint, pattern)]
+        if not matches:
+            raise RobotFileError(
+                f"joint {joint!r} has no actuator; name one for all others first, as"
+                f" `--actuator {next(iter(actuators.values()))}`"
+            )
+        name = matches[-1]
+        numbers = listed_actuator(name)
+        torque, speed, armature = numbers.stall_torque, numbers.no_load_speed, numbers.armature
+        return DriveNumbers(torque, speed, armature, numbers.note, believed=True, listed=name)
+
+    joints = [joint for of_leg in names for joint in of_leg]
+    for pattern in actuators:
+        if not any(fnmatchcase(joint, pattern) for joint in joints):
+            raise RobotFileError(
+                f"no leg has a joint {pattern!r} for an actuator; there are {', '.join(joints[:6])}"
+            )
+    drives = [[drive_of(joint) for joint in of_leg] for of_leg in names]
+    of_kinds = {listed.kind: name for name, listed in _listed_in(drives).items()}
+    if len(of_kinds) > 1:
+        raise RobotFileError(
+            f"actuator {of_kinds['torque']!r} is torque-controlled and {of_kinds['dc']!r} is not;"
+            " a robot has actuators of one kind"
+        )
+    return drives
+
+
+def _listed_in(drives: Sequence[Sequence[DriveNumbers]]) -> dict[str, ListedActuator]:
+    """Actuators of the library by name."""
+    names = dict.fromkeys(drive.listed for of_leg in drives for drive in of_leg)
+    return {name: listed_actuator(name) for name in names if name is not None}
+
+
 def chosen_kind(choice: ActuatorChoice, drives: Sequence[Sequence[DriveNumbers]]) -> ActuatorKind:
+    for actuator in _listed_in(drives).values():
+        return actuator.kind
     if choice != "auto":
         return choice
     of_joints = [drive for of_leg in drives for drive in of_leg]
@@ -161,15 +210,20 @@ _STIFFNESS, _DAMPING = (0.5, 10.0), (0.005, 0.1)
 
 def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     """Return lines of robot.toml: actuators, battery, command and sensors."""
-    largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / _VOLTAGE
-    torque = kind == "torque"
+    listed, torque = _listed_in(drives), kind == "torque"
+    voltage = min((actuator.voltage for actuator in listed.values()), default=_VOLTAGE)
+    largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / voltage
+    if listed:
+        actuators = [line for name in listed for line in _listed_tables(name, listed[name])]
+    else:
+        actuators = _torque_actuators(drives) if torque else _dc_motors(drives)
     return [
-        *(_torque_actuators(drives) if torque else _dc_motors(drives)),
+        *actuators,
         "",
-        "[supply]                            # guessed",
-        f"voltage = {_VOLTAGE}                 # V, open circuit",
+        f"[supply]                            # {'of the actuators' if listed else 'guessed'}",
+        f"voltage = {voltage}                 # V, open circuit",
         "resistance = 0.01                   # ohm",
-        *(_TORQUE_COMMAND if torque else _PWM),
+        *(_TORQUE_COMMAND if torque else _pwm(voltage)),
         "",
         "[sensors]                           # 16 bits per turn, 12 bits of current",
         "angle_counts = 10430.0              # per rad",
@@ -203,7 +257,49 @@ def proposed_control(
 
 def drive_names(drives: Sequence[Sequence[DriveNumbers]]) -> dict[DriveNumbers, str]:
     kinds = dict.fromkeys(drive for of_leg in drives for drive in of_leg)
-    return {drive: f"drive{number}" for number, drive in enumerate(kinds, start=1)}
+    return {drive: drive.listed or f"drive{number}" for number, drive in enumerate(kinds, start=1)}
+
+
+_FRICTION: Final = ("viscous_friction", *DryFriction.model_fields)
+
+
+def _listed_tables(name: str, actuator: ListedActuator) -> list[str]:
+    def numbers(*fields: str) -> list[str]:
+        given = actuator.model_fields_set
+        return [
+            f"{field} = {getattr(actuator, field)}"
+            + ("    # guessed" if field in actuator.guessed else "")
+            for field in fields
+            if field in given
+        ]
+
+    if actuator.kind == "torque":
+        return [
+            "",
+            f"[actuators.{name}]    # {actuator.note}",
+            'kind = "torque"',
+            f"gear_ratio = {actuator.gear_ratio}",
+            *numbers("torque_constant", "resistance", "rotor_inertia"),
+            *numbers("torque_limit", "speed_limit", "knee_speed", *_FRICTION),
+        ]
+    return [
+        "",
+        f"[motors.{name}]    # {actuator.note}; at the output shaft",
+        *numbers("torque_constant", "resistance"),
+        "inductance = 1e-4                   # H; guessed",
+        *numbers("rotor_inertia", "viscous_friction"),
+        "",
+        f"[gearheads.{name}]    # its friction is dry",
+        "ratio = 1.0",
+        f"nominal_torque = {actuator.stall_torque:.6g}",
+        f"nominal_speed = {actuator.no_load_speed:.6g}",
+        "efficiency = 1.0",
+        *numbers(*DryFriction.model_fields),
+        "",
+        f"[actuators.{name}]",
+        f"motor = {quoted(name)}",
+        f"gearhead = {quoted(name)}",
+    ]
 
 
 def _dc_motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
@@ -269,14 +365,16 @@ _TORQUE_COMMAND: Final = (
     "rate = 1000                         # Hz, of the joint PD in the actuators; guessed",
 )
 
-_PWM: Final = (
-    f"nominal_voltage = {_VOLTAGE}         # V",
-    "",
-    "[pwm]                               # 10 bits and a sign",
-    "counts = 1023",
-    f"full_scale = {_VOLTAGE}              # V",
-    "step = 1",
-)
+
+def _pwm(voltage: float) -> list[str]:
+    return [
+        f"nominal_voltage = {voltage}         # V",
+        "",
+        "[pwm]                               # 10 bits and a sign",
+        "counts = 1023",
+        f"full_scale = {voltage}              # V",
+        "step = 1",
+    ]
 
 
 def quoted(text: str) -> str:

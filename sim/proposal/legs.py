@@ -46,6 +46,8 @@ class LegHints:
     feet: Mapping[str, Sequence[float]] = field(default_factory=dict)
     bounds: MeshBounds = no_meshes
     mass: float | None = None  # of the robot [kg]; None: the URDF's, unless it is impossible
+    # actuators of `gaitswarm.sim.robot.library` by joint; of several that match the last
+    actuators: Mapping[str, str] = field(default_factory=dict)
 
 
 NO_HINTS: Final = LegHints()

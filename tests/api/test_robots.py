@@ -49,6 +49,14 @@ def test_a_urdf_becomes_a_robot_that_stands_and_can_be_submitted(client: httpx2.
     assert client.post("/v1/estimates", json=job).status_code == 200
 
 
+def test_a_draft_has_the_actuators_that_are_named_by_joint(client: httpx2.Client) -> None:
+    body = {"urdf": dog(), "actuators": {"*": "mx64", "*_hip_joint": "mx106"}}
+    draft = client.post("/v1/robots/drafts", json=body).json()
+    assert 'actuators = ["mx106", "mx64", "mx64"]' in draft["toml"]
+    error = refused(client, "drafts", urdf=dog(), actuators={"*": "mx46"})
+    assert "did you mean 'mx64'" in error["message"]
+
+
 def test_a_robot_that_faces_y_is_turned_when_that_is_said(client: httpx2.Client) -> None:
     quarter = '<joint name="w" type="fixed"><parent link="file"/><child link="trunk"/><origin rpy'
     left = dog().replace(

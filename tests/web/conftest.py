@@ -106,8 +106,18 @@ def server(
 @pytest.fixture(scope="session")
 def finished_job(server: ServerProcess) -> str:
     """A finished job, independent of other tests."""
+    return _finished(server, seed=7)
+
+
+@pytest.fixture(scope="session")
+def other_job(server: ServerProcess) -> str:
+    """Another finished job."""
+    return _finished(server, seed=8)
+
+
+def _finished(server: ServerProcess, seed: int) -> str:
     # The evaluations of an identical job would be reused.
-    job_id = server.submit(SMALL_JOB | {"seed": 7})
+    job_id = server.submit(SMALL_JOB | {"seed": seed})
     server.wait_for(job_id, "succeeded")
     return job_id
 

@@ -16,6 +16,24 @@ from tests.web.visit import Visit
 pytestmark = pytest.mark.slow
 
 
+SHIFTS = """() => new Promise((resolve) => {
+    let sum = 0
+    const add = (list) => { for (const { value } of list.getEntries()) sum += value }
+    new PerformanceObserver(add).observe({ type: 'layout-shift', buffered: true })
+    setTimeout(() => resolve(sum), 200)
+})"""
+"""Cumulative layout shift since the page was opened."""
+
+
+def test_nothing_moves_while_the_surface_loads(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/controller")
+    expect(page.locator("[data-surface] canvas")).to_be_visible()
+    expect(page.get_by_role("table", name="Design values")).to_be_visible()
+    assert page.evaluate(SHIFTS) < 0.05
+
+
 def test_the_surface_is_drawn_with_the_values_of_the_api(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

@@ -76,7 +76,7 @@ def test_meshes_of_a_custom_robot_are_drawn_and_can_be_hidden(
     expect(page.get_by_label("Scenario").locator("option")).to_have_count(1)
     page.goto(f"{server.url}/jobs/{job_id}")
     expect(page.get_by_text("There is no published design for this robot.")).to_be_visible()
-    expect(page.get_by_label("Compare with")).to_have_value("nothing")
+    expect(page.get_by_label("Compare with")).to_have_value("start design")
 
 
 def test_a_urdf_is_simulated_and_submitted(

@@ -121,6 +121,15 @@ def test_a_draft_survives_leaving_the_page_until_it_is_submitted(
     expect(name).to_have_value("")
 
 
+def test_presets_are_described_by_their_differences_from_the_first(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    page = visit(start_server().url).go("/jobs/new")
+    words = page.locator(".presets .muted")
+    expect(words.nth(1)).to_have_text("cycle time 2.2\xa0s")
+    expect(words.nth(4)).to_have_text("slope 10\xa0deg")
+
+
 def test_effort_is_set_in_seconds_and_shown_in_designs(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

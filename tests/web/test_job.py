@@ -114,6 +114,8 @@ def test_a_job_is_submitted_and_followed_by_keyboard_alone(
     expect(page.get_by_label("Name", exact=True)).to_be_visible()
     press_until_focused(page, "Name")
     page.keyboard.type("by keyboard")
+    press_until_focused(page, "Advanced")
+    page.keyboard.press("Enter")
     for field in ("Particles", "Iterations"):
         press_until_focused(page, field)
         page.keyboard.press("ControlOrMeta+a")
@@ -183,7 +185,7 @@ def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     expect_state(page, "succeeded")
     page.goto(f"{page.url}/summary")
     figures = page.get_by_role("region", name="Summary").locator("dl")
-    expect(figures.locator("div", has_text="Precision")).to_contain_text("single")
+    expect(figures.locator("div", has_text=re.compile("^Precision"))).to_contain_text("single")
     expect(figures).to_contain_text("Best fitness (double precision)")
     expect(figures).to_contain_text(f"{best['fitness']:.7g}")
     searched = figures.locator("div", has_text="Fitness in the search (single precision)")
@@ -241,6 +243,39 @@ def test_a_result_is_shown_in_words_figures_and_charts_before_anything_else(
     expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "false")
     page.get_by_role("button", name="Play", exact=True).click()
     expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "true")
+
+
+def test_scenarios_are_compared_with_the_reference_of_the_job_by_speed(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"preference": "C", "seed": 3})
+    job = server.wait_for(job_id, "succeeded")
+    assert job["reference"]["name"] == "C"
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    expect(page.get_by_label("Compare with")).to_have_value("fuzzy-pi, C")
+    table = page.get_by_role("table", name="Objectives of the winner by scenario")
+    heads = table.locator("thead th")
+    expect(heads).to_contain_text(["speed [m/s]"])
+    column = heads.all_inner_texts().index("speed [m/s]")
+    for name, result in job["best"]["scenarios"].items():
+        cell = table.locator("tbody tr", has_text=name).locator("th, td").nth(column)
+        speed = 1.0 / result["objectives"]["reciprocal_speed"]
+        expect(cell).to_contain_text(f"{speed:#.4g}")
+        change = cell.locator("[data-tone]")
+        faster = "+" in change.inner_text()
+        expect(change).to_have_attribute("data-tone", "better" if faster else "worse")
+        expect(change).to_contain_text("✓" if faster else "✗")
+
+
+def test_a_job_without_a_fitness_says_so_in_place_of_its_convergence(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"constraints": ["speed>=9"], "iterations": 1})
+    server.wait_for(job_id, "succeeded")
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    card = page.get_by_role("region", name="Convergence")
+    expect(card.get_by_role("heading", name="No design with a fitness yet")).to_be_visible()
+    expect(card.locator(".uplot")).to_have_count(0)
 
 
 def test_a_click_on_the_convergence_opens_the_iteration(

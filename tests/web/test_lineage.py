@@ -57,7 +57,7 @@ def test_a_fork_and_its_parent_link_to_each_other(
     expect(row).to_contain_text(f"fork of {finished_job}")
 
 
-def test_a_job_of_many_small_iterations_can_be_forked_at_its_end(
+def test_a_job_of_many_small_iterations_can_be_forked_at_its_end_with_other_weights(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     small = {"name": "cma-es", "particles": 5, "population": 4}
@@ -69,10 +69,13 @@ def test_a_job_of_many_small_iterations_can_be_forked_at_its_end(
     dialog = page.get_by_role("dialog", name="Fork the job")
     expect(dialog.get_by_label("First new iteration")).to_have_value(str(job["iterations"]))
     expect(dialog.get_by_label("Evaluations in total")).to_have_value("30")
+    dialog.get_by_text("Weights of the scenarios, all 1").click()
+    dialog.get_by_label("Weight of loaded").fill("2")
     dialog.get_by_role("button", name="Fork the job").click()
     expect(page).not_to_have_url(re.compile(job_id))
     fork = server.wait_for(page.url.rpartition("/")[2], "succeeded")
     assert fork["evaluations"] == 30
+    assert fork["spec"]["scenario_weights"] == {"loaded": 2.0}
 
 
 def test_evidence_is_downloaded_and_verified(

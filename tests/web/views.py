@@ -10,14 +10,19 @@ from playwright.sync_api import Page, expect
 from tests.web.visit import Visit
 
 VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
+    "first run": {
+        "first-run": "/",
+    },
     "jobs": {
         "jobs": "/jobs",
         "new-job": "/jobs/new",
+        "new-job-in-full": "/jobs/new?clone={job}",
     },
     "other forms and comparison": {
         "new-identification": "/jobs/new?kind=identification",
+        "new-calibration": "/jobs/new?kind=calibration",
         "custom-robot": "/jobs/new?robot=own",
-        "compare": "/compare?jobs={job}",
+        "compare": "/compare?jobs={job},{other}",
     },
     "a job": {
         "job": "/jobs/{job}",
@@ -48,14 +53,14 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "no-such-path": "/nosuch",
     },
 }
-"""Paths by group and name; {job} is a succeeded job."""
+"""Paths by group and name; {job} and {other} are succeeded jobs. The first run has no jobs."""
 
 _PATHS: Final = {name: path for views in VIEWS.values() for name, path in views.items()}
 
 
-def open_view(visited: Visit, name: str, job: str) -> Page:
+def open_view(visited: Visit, name: str, job: str, other: str = "") -> Page:
     """Open a view and wait until it is loaded."""
-    page = visited.go(_PATHS[name].format(job=job))
+    page = visited.go(_PATHS[name].format(job=job, other=other))
     expect(page.get_by_role("main")).not_to_be_empty()
     page.wait_for_load_state("networkidle")
     return page

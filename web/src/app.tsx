@@ -108,7 +108,7 @@ let navigated = false
 
 function NotFound() {
   return (
-    <Empty title="Page not found">
+    <Empty title="Page not found" level={1}>
       <p>
         Go to the <a href="/jobs">list of jobs</a>.
       </p>

@@ -10,17 +10,11 @@ import { useVisible } from '../components/use-visible'
 import { change, formatNumber, NONE } from '../format/number'
 import { placeWord } from '../format/place'
 import { capitalized, inWords } from '../format/words'
+import { amountOf, type Quantity, quantityOf } from '../job/quantity'
 import { setQuery } from '../router/navigation'
 import { RATE, WalkStage } from '../walk/player/walk-stage'
 import { recordWalk } from '../walk/replay/replay'
 import { JobName } from './charts'
-
-interface Quantity {
-  readonly name: string
-  readonly unit: string
-  /** Whether more is better. */
-  readonly more: boolean
-}
 
 /** scenario: empty for the mean over those that all jobs have. */
 export function Outcomes({ jobs, scenario }: { jobs: readonly Job[]; scenario: string }) {
@@ -172,24 +166,18 @@ export function sharedScenarios(jobs: readonly Pick<Job, 'best'>[]): readonly st
 
 function quantitiesOf(jobs: readonly Job[]): readonly Quantity[] {
   const all = new Map(jobs.flatMap((job) => job.objectives).map(({ name, unit }) => [name, unit]))
-  return [...all].map(([name, unit]) =>
-    name === 'reciprocal_speed'
-      ? { name: 'speed', unit: 'm/s', more: true }
-      : { name, unit, more: false },
-  )
+  return [...all].map(([name, unit]) => quantityOf({ name, unit }))
 }
 
 /** Mean over scenarios; null if the design fails in one of them. */
 export function outcomeOf(
   { best }: Pick<Job, 'best'>,
-  { name }: Pick<Quantity, 'name'>,
+  quantity: Pick<Quantity, 'name'>,
   scenarios: readonly string[],
 ): number | null {
-  const values = scenarios.map((scenario) => {
-    const objectives = best?.scenarios[scenario]?.objectives
-    const slowness = objectives?.reciprocal_speed
-    return name === 'speed' ? slowness && 1 / slowness : objectives?.[name]
-  })
-  if (values.length === 0 || values.some((value) => typeof value !== 'number')) return null
-  return (values as number[]).reduce((sum, value) => sum + value, 0) / values.length
+  const values = scenarios
+    .map((scenario) => amountOf(best?.scenarios[scenario], quantity))
+    .filter((value) => value !== null)
+  if (values.length === 0 || values.length < scenarios.length) return null
+  return values.reduce((sum, value) => sum + value, 0) / values.length
 }

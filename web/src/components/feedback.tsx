@@ -12,11 +12,19 @@ export function Loading({ what }: { what: string }) {
   )
 }
 
+interface EmptyProps {
+  title: string
+  /** Of the title: 1 if nothing else is on the page. */
+  level?: 1 | 2
+  children?: ComponentChildren
+}
+
 /** Nothing to show yet; children explain how to change that. */
-export function Empty({ title, children }: { title: string; children?: ComponentChildren }) {
+export function Empty({ title, level = 2, children }: EmptyProps) {
+  const Heading = `h${level}` as const
   return (
     <div class="empty">
-      <h2>{title}</h2>
+      <Heading>{title}</Heading>
       {children}
     </div>
   )

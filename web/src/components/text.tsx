@@ -3,12 +3,16 @@
 import { Fragment } from 'preact'
 import { writtenUnit } from '../format/number'
 
+/** Parts of an API name between which it may wrap. */
+export function partsOf(name: string): readonly string[] {
+  return name.split(/(?<=[_-])/)
+}
+
 /** An API name that may wrap after its underscores. */
 export function BrokenName({ name }: { name: string }) {
-  const parts = name.split(/(?<=_)/)
   return (
     <>
-      {parts.map((part, k) => (
+      {partsOf(name).map((part, k) => (
         <Fragment key={k}>
           {k > 0 && <wbr />}
           {part}

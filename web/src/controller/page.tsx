@@ -51,11 +51,13 @@ function Controller({ source, query }: { source: DesignSource; query: URLSearchP
         {(design) => (
           <>
             {isLinear(design) ? (
-              <ControlLaw design={design} />
+              <>
+                <ControlLaw design={design} />
+                <DesignCard design={design} />
+              </>
             ) : (
               <Fuzzy design={design} velocity={Number.isFinite(velocity) ? velocity : 0} />
             )}
-            <DesignCard design={design} />
           </>
         )}
       </Loaded>
@@ -65,21 +67,28 @@ function Controller({ source, query }: { source: DesignSource; query: URLSearchP
 
 function Fuzzy({ design, velocity }: { design: ResolvedDesign; velocity: number }) {
   const key = JSON.stringify([design.controller.name, design.design, velocity])
-  const surface = useResource(key, (signal) =>
-    post('/v1/controllers/{controller}/surface', {
-      path: { controller: design.controller.name },
-      body: { design: { ...design.design }, ...GRID, velocity_error: velocity },
-      signal,
-    }),
+  const surface = useResource(
+    key,
+    (signal) =>
+      post('/v1/controllers/{controller}/surface', {
+        path: { controller: design.controller.name },
+        body: { design: { ...design.design }, ...GRID, velocity_error: velocity },
+        signal,
+      }),
+    { keep: true },
   )
   return (
-    <Loaded
-      resource={surface}
-      what="the fuzzy surface"
-      failed="Could not compute the fuzzy surface."
-    >
-      {(data) => <Outputs surface={data} />}
-    </Loaded>
+    <>
+      <Loaded
+        resource={surface}
+        what="the fuzzy surface"
+        failed="Could not compute the fuzzy surface."
+      >
+        {(data) => <Outputs surface={data} />}
+      </Loaded>
+      {/* Below the surface, which would move it. */}
+      {(surface.data || surface.error) && <DesignCard design={design} />}
+    </>
   )
 }
 

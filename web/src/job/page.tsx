@@ -4,8 +4,7 @@ import type { FunctionComponent } from 'preact'
 import { useEffect } from 'preact/hooks'
 import { isReadable } from '../api/jobs'
 import type { Job } from '../api/types'
-import { EmptyCard } from '../components/card'
-import { ErrorNotice, Loading } from '../components/feedback'
+import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
 import { lazyPage } from '../router/lazy-page'
@@ -94,12 +93,14 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
         {live.error === null ? (
           <Loading what="the job" />
         ) : live.missing ? (
-          <EmptyCard title="There is no such job">
-            <p>
-              Job {id} was deleted or belongs to another server. Look for it in the{' '}
-              <a href="/jobs">list of jobs</a>.
-            </p>
-          </EmptyCard>
+          <section class="card">
+            <Empty title="There is no such job" level={1}>
+              <p>
+                Job {id} was deleted or belongs to another server. Look for it in the{' '}
+                <a href="/jobs">list of jobs</a>.
+              </p>
+            </Empty>
+          </section>
         ) : (
           <>
             <h1>Job {id}</h1>

@@ -12,7 +12,14 @@ export interface Reference {
   readonly scenarios: Readonly<Record<string, ScenarioResult>>
 }
 
-/** Load the reference for an address value: `published:fuzzy-pi:A`, `job:k2q7`, `none`. */
+/** The job's own reference as an address value; null if it has none. */
+export function ownReference({ kind, spec, reference }: Job): string | null {
+  if (kind !== 'tuning' || !reference) return null
+  if (reference.kind === 'start') return 'start'
+  return `published:${(spec as JobSpec).controller}:${reference.name}`
+}
+
+/** Load the reference for an address value: `published:fuzzy-pi:A`, `job:k2q7`, `start`, `none`. */
 export function useReference(job: Job, choice: string) {
   const key = choice === 'none' ? null : `${job.id} ${choice}`
   return useResource<Reference>(key, (signal) => load(job, choice, signal))
@@ -25,12 +32,29 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
     if (!other.best) throw new Error('that job has no feasible design yet')
     return { label: other.name || other.id, scenarios: other.best.scenarios }
   }
+  if (kind === 'start') return startOf(job, signal)
   const controllers = await catalogue()
   if (!isPublished((job.spec as JobSpec).robot)) throw new Error(NOT_PUBLISHED)
   const design = controllers.find((c) => c.name === name)?.published[study]
   if (!design) throw new Error(`there is no published design ${study} of ${name}`)
   const result = await walkOf(job.spec as JobSpec, name as JobSpec['controller'], design)
   return { label: `published ${study}`, scenarios: result.scenarios }
+}
+
+/** The start design, as far as the verdict compares it. */
+async function startOf({ id }: Job, signal: AbortSignal): Promise<Reference> {
+  const path = { job_id: id }
+  const { reference, quantities } = await get('/v1/jobs/{job_id}/verdict', { path, signal })
+  const scenarios: Record<string, ScenarioResult> = {}
+  for (const { name, scenarios: figures } of quantities) {
+    for (const [scenario, { reference: value }] of Object.entries(figures)) {
+      scenarios[scenario] ??= { status: 'ok', explanation: '', utility: null, objectives: {} }
+      const [objective, measured] =
+        name === 'speed' ? ['reciprocal_speed', 1 / value] : [name, value]
+      scenarios[scenario].objectives[objective] = measured
+    }
+  }
+  return { label: reference?.name ?? 'start design', scenarios }
 }
 
 export async function publishedReferences(job: Job): Promise<readonly Reference[]> {
@@ -69,6 +93,8 @@ export function ReferencePicker({ job, choice, label, onChoose }: ReferencePicke
   const hasPublished = tuning && isPublished((job.spec as JobSpec).robot)
   const published = useResource(hasPublished ? 'controllers' : null, catalogue)
   const groups = [{ label: '', choices: [{ value: 'none', label: 'nothing' }] }]
+  if (ownReference(job) === 'start')
+    groups[0].choices.push({ value: 'start', label: 'start design' })
   if (hasPublished) groups.push({ label: 'Published designs', choices: designs(published.data) })
   const selected = groups.flatMap(({ choices }) => choices).find(({ value }) => value === choice)
   return (

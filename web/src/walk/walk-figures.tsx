@@ -1,6 +1,7 @@
 /** Figures of a walk that people know, compared with a baseline if there is one. */
 
 import { formatNumber, percent, quantity } from '../format/number'
+import { amountOf, MARKS } from '../job/quantity'
 import type { Recorded, Replay } from './replay/replay'
 import { peakOf, slipPerMetre } from './replay/support'
 
@@ -14,14 +15,19 @@ interface Figure {
 
 function figuresOf(replay: Replay): readonly Figure[] {
   const { objectives, robot, gravity, load_kg } = replay.header
-  const { reciprocal_speed: slowness, energy } = objectives
+  const { energy } = objectives
   const weight = (robot.mass + load_kg) * Math.hypot(...gravity)
   const current = peakOf(replay, 'current', robot.current_limits)
   const torque = peakOf(replay, 'load_torque', robot.torque_limits)
   const ofLimit = (peak: typeof current, limit: string) =>
     peak && `${percent(peak.share, 2)} of ${limit}`
   return [
-    { label: 'Speed', unit: 'm/s', better: 'more', value: slowness ? 1 / slowness : null },
+    {
+      label: 'Speed',
+      unit: 'm/s',
+      better: 'more',
+      value: amountOf({ objectives }, { name: 'speed' }),
+    },
     { label: 'Cost of transport', unit: '1', better: 'less', value: energy && energy / weight },
     {
       label: 'Peak current',
@@ -73,10 +79,9 @@ function Change({ value, from, better, unit }: ChangeProps) {
   const same = Math.abs(relative) <= 0.005
   const isBetter = relative > 0 === (better === 'more')
   const tone = same ? 'same' : isBetter ? 'better' : 'worse'
-  const mark = { same: '=', better: '✓', worse: '✗' }[tone]
   return (
     <dd class="judged" data-tone={tone}>
-      <b>{mark}</b>{' '}
+      <b>{MARKS[tone]}</b>{' '}
       {same
         ? 'the same as'
         : `${percent(Math.abs(relative), 2)} ${relative > 0 ? 'more' : 'less'} than`}{' '}

@@ -1,10 +1,10 @@
 /** Parallel coordinates; dragging along an axis selects a range. */
 
 import { useEffect, useMemo, useRef } from 'preact/hooks'
-import { BrokenName } from '../../components/text'
+import { BrokenName, partsOf } from '../../components/text'
 import { formatExact, writtenUnit } from '../../format/number'
 import { themeColour, useTheme } from '../../theme'
-import { useWidth } from '../canvas'
+import { remPixels, useWidth } from '../canvas'
 import { shareOf } from '../scale'
 import {
   type Brush,
@@ -23,6 +23,10 @@ export type Brushes = ReadonlyMap<number, Brush>
 const LEAST_STROKE = 0.01
 const AXIS_WIDTH_PX = 48
 const HEIGHT_PX = 380
+/** Mean width of a character of a small heading [rem]. */
+const CHARACTER = 0.55
+/** Distance between headings [px]. */
+const GAP_PX = 6
 
 interface ParallelCoordinatesProps {
   model: ParallelModel
@@ -49,11 +53,14 @@ export function ParallelCoordinates({ model, brushes, onBrush, label }: Parallel
   }, [model, selected, palette, width])
 
   const least = model.axes.length * AXIS_WIDTH_PX
+  const longest = Math.max(...model.axes.flatMap(({ name }) => partsOf(name).map(lengthOf)))
+  const upright =
+    width > 0 && width / model.axes.length < longest * CHARACTER * remPixels() + GAP_PX
   return (
     // A scrollable box must be reachable by keyboard.
     <section class="parallel-scroll" tabIndex={0} aria-label={`${label}, by axis`}>
       <div ref={box} style={{ minWidth: `${least}px` }}>
-        <div class="parallel-heads">
+        <div class="parallel-heads" data-upright={upright || undefined}>
           {model.axes.map((axis) => (
             <span key={axis.name} class="small">
               <strong>
@@ -104,6 +111,8 @@ export function ParallelCoordinates({ model, brushes, onBrush, label }: Parallel
     </section>
   )
 }
+
+const lengthOf = (text: string) => text.length
 
 function Mark({ mark }: { mark: number | string }) {
   return <BrokenName name={typeof mark === 'string' ? mark : formatExact(mark, 4)} />

@@ -2,6 +2,7 @@
 
 import { useState } from 'preact/hooks'
 import { get, patch, post, put } from '../../api/client'
+import { ApiProblem } from '../../api/problem'
 import { useResource } from '../../api/resource'
 import type { Job, StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
@@ -11,6 +12,7 @@ import { ChoiceField, TextField } from '../../components/fields/field'
 import { formatCount } from '../../format/number'
 import { navigate } from '../../router/navigation'
 import { jobPath } from '../../router/routes'
+import { type Measure, MeasureFields, measureOf } from '../../submission/sections/measure'
 import {
   budgetSpent,
   HIGHEST,
@@ -156,6 +158,7 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
   const [name, setName] = useState(job.name)
   const [preference, setPreference] = useState(AS_PARENT)
   const [method, setMethod] = useState(AS_PARENT)
+  const [measure, setMeasure] = useState(() => measureIn(job))
   const [sending, setSending] = useState(false)
   const [error, setError] = useState<unknown>(null)
   const preferences = useResource('preferences', (signal) => get('/v1/preferences', { signal }))
@@ -179,6 +182,7 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
       accept_changes: false,
       preference: changed(preference) as 'A' | null,
       optimizer: changed(method) as 'pso' | null,
+      ...changesOf(measure, measureIn(job), job.scenarios),
     }
     post('/v1/jobs/{job_id}/fork', { path: { job_id: job.id }, body })
       .then((forked) => navigate(jobPath(forked.id)), setError)
@@ -221,7 +225,33 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
         value={method}
         onChange={setMethod}
       />
+      {job.kind === 'tuning' && job.scenarios.length > 1 && (
+        <MeasureFields
+          names={job.scenarios}
+          {...measure}
+          errors={
+            new Map(
+              (error instanceof ApiProblem ? error.errors : []).map((e) => [e.field, e.message]),
+            )
+          }
+          onChange={(changes) => setMeasure((old) => ({ ...old, ...changes }))}
+        />
+      )}
       {error !== null && <ErrorNotice what="Could not fork the job." error={error} />}
     </ConfirmDialog>
   )
+}
+
+function measureIn({ spec }: StoredJob): Measure {
+  const { scenario_weights: weights = {}, scenario_aggregate: aggregate = 'mean' } =
+    spec?.kind === 'tuning' ? spec : {}
+  const texts = Object.entries(weights).map(([name, weight]) => [name, String(weight)])
+  return { weights: Object.fromEntries(texts), aggregate }
+}
+
+/** Both fields of a fork's measure if it differs from that of the parent. */
+function changesOf(measure: Measure, parent: Measure, names: readonly string[]) {
+  const [fork, before] = [measureOf(names, measure), measureOf(names, parent)]
+  if (JSON.stringify(fork) === JSON.stringify(before)) return {}
+  return { scenario_weights: {}, scenario_aggregate: 'mean' as const, ...fork }
 }

@@ -8,6 +8,7 @@ import type { Iteration, Job } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { type Band, LineChart, type Series } from '../../charts/lines/line-chart'
 import { lineLabel, type ReferenceLine } from '../../charts/lines/reference-line'
+import { Empty } from '../../components/feedback'
 import { Check } from '../../components/fields/controls'
 import { formatCount, formatNumber, withUnit } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
@@ -106,24 +107,33 @@ export function ConvergenceChart({
         />
       )}
     >
-      <LineChart
-        label={`Convergence over ${iterations.length} iterations; best fitness ${formatNumber(best)}${
-          reference ? `, ${lineLabel(reference)}` : ''
-        }`}
-        x={drawn.x}
-        xLabel="iteration"
-        counted
-        yLabel="fitness"
-        yUnit={unit}
-        series={drawn.series}
-        bands={drawn.bands}
-        logarithmic={logarithmic}
-        yRange={range}
-        paint={paint}
-        paintOver={over}
-        onPick={(x) => navigate(jobPath(job.id, `iterations/${pickable(x, iterations.length)}`))}
-        height={320}
-      />
+      {best === null && !dots?.fitness.length ? (
+        <Empty title="No design with a fitness yet">
+          <p>
+            Every design so far fails in a scenario or violates a constraint. The{' '}
+            <a href={jobPath(job.id, 'iterations')}>iterations</a> count them.
+          </p>
+        </Empty>
+      ) : (
+        <LineChart
+          label={`Convergence over ${iterations.length} iterations; best fitness ${formatNumber(best)}${
+            reference ? `, ${lineLabel(reference)}` : ''
+          }`}
+          x={drawn.x}
+          xLabel="iteration"
+          counted
+          yLabel="fitness"
+          yUnit={unit}
+          series={drawn.series}
+          bands={drawn.bands}
+          logarithmic={logarithmic}
+          yRange={range}
+          paint={paint}
+          paintOver={over}
+          onPick={(x) => navigate(jobPath(job.id, `iterations/${pickable(x, iterations.length)}`))}
+          height={320}
+        />
+      )}
     </ChartCard>
   )
 }

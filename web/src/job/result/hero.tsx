@@ -7,6 +7,7 @@ import { jobPath, withQuery } from '../../router/routes'
 import { CertifyButton } from '../certificate/certify'
 import { hasEnded, searchedVariables } from '../facts'
 import type { Gain } from '../gain'
+import { amountOf, MARKS } from '../quantity'
 import { WalkPoster } from './poster'
 import './hero.css'
 import '../../walk/player/walk-stage.css'
@@ -82,7 +83,7 @@ const FIGURES: readonly Figure[] = [
     name: 'speed',
     label: 'Speed',
     unit: 'm/s',
-    value: ({ objectives: { reciprocal_speed: slowness } }) => slowness && 1 / slowness,
+    value: (result) => amountOf(result, { name: 'speed' }),
     more: 'faster',
     less: 'slower',
   },
@@ -163,9 +164,6 @@ function Comparison({ compared, value, unit, words: [more, less] }: ComparisonPr
     </dd>
   )
 }
-
-/** Shape in addition to colour. */
-const MARKS = { better: '✓', same: '=', worse: '✗' } as const
 
 /** Null unless all values are positive; weights: 1 if missing. */
 function geometricMean(

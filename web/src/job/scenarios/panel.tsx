@@ -1,9 +1,8 @@
 /** Utilities and objectives of the winner by scenario, compared with a reference. */
 
 import { get } from '../../api/client'
-import { isPublished } from '../../api/jobs'
 import { type Resource, useResource } from '../../api/resource'
-import type { Job, JobSpec, Preference, RecordingView, ScenarioResult } from '../../api/types'
+import type { Job, Preference, RecordingView, ScenarioResult } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Card, EmptyCard, Loaded } from '../../components/card'
 import { type Column, Table } from '../../components/table/table'
@@ -14,7 +13,8 @@ import { withQuery } from '../../router/routes'
 import { Bars } from '../bars'
 import { caseWords, fitnessUnit } from '../facts'
 import { utilityOf } from '../preference'
-import { type Reference, ReferencePicker, useReference } from '../reference'
+import { amountOf, MARKS, type Quantity, quantityOf } from '../quantity'
+import { ownReference, type Reference, ReferencePicker, useReference } from '../reference'
 import './notes.css'
 
 interface Row {
@@ -28,8 +28,7 @@ interface Row {
 
 export default function ScenariosPanel({ job }: { job: Job }) {
   const { query } = usePlace()
-  const hasPublished = job.kind === 'tuning' && isPublished((job.spec as JobSpec).robot)
-  const choice = query.get('against') ?? (hasPublished ? 'published:fuzzy-pi:A' : 'none')
+  const choice = query.get('against') ?? ownReference(job) ?? 'none'
   const reference = useReference(job, choice)
   const recordings = useRecordings(job)
   const words = caseWords(job.kind)
@@ -65,7 +64,7 @@ export default function ScenariosPanel({ job }: { job: Job }) {
         {label !== null && (
           <p class="muted small table-note">
             Each cell shows the winner, the reference ({label}) and the relative difference.
-            {isRanked(job) && ' Lower is better.'}
+            {isRanked(job) && ' Colours and marks show what is better.'}
           </p>
         )}
         <details class="small notes-fold">
@@ -206,44 +205,51 @@ function objectiveColumns(job: Job, compared: boolean): readonly Column<Row>[] {
           label
         ),
     },
-    ...job.objectives.map(
-      ({ name, unit }): Column<Row> => ({
-        key: name,
-        label: inWords(name),
-        unit,
+    ...job.objectives.map((objective): Column<Row> => {
+      const shown = quantityOf(objective)
+      return {
+        key: shown.name,
+        label: inWords(shown.name),
+        unit: shown.unit,
         numeric: true,
-        value: ({ winner }) => winner.objectives[name] ?? null,
+        value: ({ winner }) => amountOf(winner, shown),
         cell: ({ winner, other }) => (
           <Compared
-            ranked={isRanked(job)}
-            winner={winner.objectives[name]}
-            other={compared ? (other?.objectives[name] ?? null) : undefined}
+            quantity={isRanked(job) ? shown : null}
+            winner={amountOf(winner, shown)}
+            other={compared ? amountOf(other, shown) : undefined}
           />
         ),
-      }),
-    ),
+      }
+    }),
   ]
 }
 
 interface ComparedProps {
-  ranked: boolean
+  /** Null if neither more nor less is better. */
+  quantity: Quantity | null
   winner: number | null
   other: number | null | undefined
 }
 
-function Compared({ ranked, winner, other }: ComparedProps) {
+function Compared({ quantity, winner, other }: ComparedProps) {
   if (other === undefined) return <>{formatNumber(winner)}</>
   // A ratio of values with different signs is meaningless.
   const comparable = winner !== null && other !== null && winner > 0 && other > 0
   const share = comparable ? (winner / other - 1) * 100 : null
-  const tone =
-    !ranked || share === null || Math.abs(share) < 0.05 ? 'same' : share < 0 ? 'better' : 'worse'
+  const isSame = quantity === null || share === null || Math.abs(share) < 0.05
+  const tone = isSame ? 'same' : share > 0 === quantity.more ? 'better' : 'worse'
   return (
     <span class="compared">
       <span>{formatNumber(winner)}</span>
       <span class="muted small">
         {formatNumber(other)}{' '}
-        {share !== null && <span data-tone={tone}>{change(share, '%', 2)}</span>}
+        {share !== null && (
+          <span data-tone={tone}>
+            {!isSame && `${MARKS[tone]} `}
+            {change(share, '%', 2)}
+          </span>
+        )}
       </span>
     </span>
   )

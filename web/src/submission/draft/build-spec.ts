@@ -2,6 +2,7 @@
 
 import type { FieldError } from '../../api/problem'
 import type { JobSpec, Variable } from '../../api/types'
+import { measureOf } from '../sections/measure'
 import type { Draft } from './draft'
 import { constraintsOf, number, settingValues, startOf } from './settings'
 
@@ -32,7 +33,7 @@ export function specOf(draft: Draft): JobSpec {
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
     ...(constraints.length > 0 && { constraints }),
-    ...measureOf(draft),
+    ...measureOf(scenarioNames(draft), draft),
     ...(draft.case !== null && { case: settingValues(draft.case) }),
     ...(worlds !== undefined && { worlds }),
     optimizer: settingValues(draft.optimizer),
@@ -107,16 +108,6 @@ function preferenceOf({ preference }: Draft): JobSpec['preference'] {
 /** Names of the scenarios, in the order of the spec. */
 export function scenarioNames({ presets, custom }: Draft): readonly string[] {
   return [...presets, ...custom.map(({ name }) => name)]
-}
-
-/** Weights other than 1 of the job's scenarios, or the worst of them. */
-function measureOf(draft: Draft): Partial<JobSpec> {
-  if (draft.aggregate === 'worst') return { scenario_aggregate: 'worst' }
-  const weights = scenarioNames(draft).flatMap((name) => {
-    const text = draft.weights[name]?.trim() || '1'
-    return number(text) === 1 ? [] : [[name, number(text)]]
-  })
-  return weights.length > 0 ? { scenario_weights: Object.fromEntries(weights) } : {}
 }
 
 /** undefined for a job evaluated in the nominal model only. */

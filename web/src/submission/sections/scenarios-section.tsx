@@ -3,7 +3,7 @@
 import { useRef, useState } from 'preact/hooks'
 import type { ScenarioPreset } from '../../api/types'
 import { Card } from '../../components/card'
-import { Check, Segmented, Select } from '../../components/fields/controls'
+import { Check, Select } from '../../components/fields/controls'
 import { Problems, TextField } from '../../components/fields/field'
 import { exactQuantity } from '../../format/number'
 import { inWords } from '../../format/words'
@@ -12,6 +12,7 @@ import type { Catalogue } from '../draft/catalogue'
 import { scenarioDraft } from '../draft/draft'
 import type { SchemaField } from '../fields/schema-fields'
 import { SchemaInput } from '../fields/schema-input'
+import { MeasureFields } from './measure'
 import type { SectionProps } from './settings'
 
 type CustomDraft = Readonly<Record<string, string>>
@@ -86,47 +87,14 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
             onChoose={add}
           />
         </div>
-        <Measure draft={draft} catalogue={catalogue} errors={errors} onChange={onChange} />
+        <MeasureFields
+          names={scenarioNames(draft)}
+          {...draft}
+          errors={errors}
+          onChange={onChange}
+        />
       </div>
     </Card>
-  )
-}
-
-/** Weights of the scenarios in the mean, or the worst of them. */
-function Measure({ draft, errors, onChange }: SectionProps) {
-  const { weights, aggregate } = draft
-  const names = scenarioNames(draft)
-  const fields = names.map((name) => (
-    <TextField
-      key={name}
-      label={`Weight of ${name}`}
-      inputMode="decimal"
-      value={weights[name] ?? '1'}
-      error={errors.get(`scenario_weights.${name}`)}
-      onChange={(value) => onChange({ weights: { ...weights, [name]: value } })}
-    />
-  ))
-  const equal = names.every((name) => (weights[name] ?? '1') === '1')
-  return (
-    <>
-      <Segmented
-        roomy
-        label="Judged by"
-        value={aggregate}
-        options={[
-          ['mean', 'geometric mean'],
-          ['worst', 'worst scenario'],
-        ]}
-        onChoose={(chosen) => onChange({ aggregate: chosen })}
-      />
-      {aggregate !== 'worst' && (
-        <details>
-          <summary>Weights of the scenarios{equal && ', all 1'}</summary>
-          <div class="fields">{fields}</div>
-        </details>
-      )}
-      <Problems messages={[errors.get('scenario_weights'), errors.get('scenario_aggregate')]} />
-    </>
   )
 }
 
@@ -144,9 +112,9 @@ function PresetChoices({ scenarios, catalogue, selected, onToggle }: PresetChoic
     [...catalogue.fields.scenario.values()]
       .flatMap(({ name, unit }) => {
         const value = scenario[name as keyof ScenarioPreset]
-        if (GAIT.has(name) || value === first[name as keyof ScenarioPreset]) return []
-        const shown = typeof value === 'number' ? exactQuantity(value, unit) : inWords(`${value}`)
-        return [`${inWords(name)} ${shown}`]
+        const usual = first[name as keyof ScenarioPreset]
+        if (GAIT.has(name) || JSON.stringify(value) === JSON.stringify(usual)) return []
+        return [`${inWords(name)} ${shown(value, unit)}`]
       })
       .join(', ')
   return (
@@ -164,6 +132,12 @@ function PresetChoices({ scenarios, catalogue, selected, onToggle }: PresetChoic
       ))}
     </ul>
   )
+}
+
+function shown(value: unknown, unit: string): string {
+  if (typeof value === 'number') return exactQuantity(value, unit)
+  const word = typeof value === 'object' ? (value as { kind?: string } | null)?.kind : value
+  return inWords(`${word ?? 'none'}`)
 }
 
 interface CustomScenarioProps {

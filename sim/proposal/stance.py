@@ -66,7 +66,10 @@ def choose_stance(legs: Sequence[ChainLeg], height: float = HEIGHTS[0]) -> Stanc
     tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)
     ground = hips - height * (hips - max(float(feet[:, 2].min()) for _, feet in tried))
-    chosen = [_best(leg, *of, ground, hips - ground) for leg, of in zip(legs, tried, strict=True)]
+    middle = np.mean([leg.hip for leg in legs], axis=0)
+    chosen = [
+        _best(leg, *of, ground, hips - ground, middle) for leg, of in zip(legs, tried, strict=True)
+    ]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))
     aside = [_moved_aside(*of, radius, ground) for of in zip(legs, chosen, feet, strict=True)]
@@ -81,7 +84,10 @@ def choose_stance(legs: Sequence[ChainLeg], height: float = HEIGHTS[0]) -> Stanc
     return Stance(tuple(apart), hips - ground, tuple(radii))
 
 
-def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: float) -> Floats:
+def _best(
+    leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: float, middle: Floats
+) -> Floats:
+    """middle: of the hips [m]."""
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
         raise NoStance(
@@ -97,11 +103,16 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: fl
     torque = (slopes[:, 2, :] ** 2).sum(axis=1) / length**2
     to_limits = np.minimum(angles - leg.limits[:, 0], leg.limits[:, 1] - angles).min(axis=1)
     tight = np.maximum(0.0, 1.0 - to_limits / _MARGIN)
-    # A leg with a vertical hip axis points where it is mounted.
-    ahead = np.zeros(len(feet)) if leg.is_upright else ((feet[:, 0] - leg.hip[0]) / length) ** 2
+    reach = (feet - leg.hip) / length
+    if leg.is_upright:
+        # A leg with a vertical hip axis points where it is mounted, but not below the body.
+        mounted = (leg.hip - middle)[:2]
+        astray = np.minimum(reach[:, :2] @ mounted / max(math.hypot(*mounted), 1e-9), 0.0)
+    else:
+        astray = reach[:, 0]
     # A hip rotated from the file's zero spreads or crosses the legs.
     spread, folded = angles[:, 0] ** 2, (angles[:, 1:] ** 2).sum(axis=1)
-    worth = freedom - 20.0 * torque - 5.0 * tight - 20.0 * ahead - 40.0 * spread - 0.02 * folded
+    worth = freedom - 20.0 * torque - 5.0 * tight - 20.0 * astray**2 - 40.0 * spread - 0.02 * folded
     return np.asarray(angles[int(worth.argmax())])
 
 

@@ -16,6 +16,7 @@ from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.legs import find_legs
 from gaitswarm.sim.robot import Robot, parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.posture import feet_in_body
 from gaitswarm.sim.robot.urdf import parse_urdf
 from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import quadruped_files
@@ -127,6 +128,25 @@ def test_the_stance_is_level_within_limits_and_its_walks_can_be_planned(urdf: st
         assert isinstance(first, ChainLeg)
         away = np.abs(desired_angles(robot, scenario).angles[:, :3] - first.stance)
         assert away.min(axis=0).max() < 0.1
+
+
+def test_legs_that_turn_about_upright_axes_do_not_step_below_the_body() -> None:
+    swung = dog().replace('axis xyz="1 0 0"', 'axis xyz="0 0 1"')
+    for limits, wider in (
+        ("-0.8 0.8", "-2.03 2.51"),
+        ("-1.0 3.5", "-2 2"),
+        ("-2.7 -0.8", "-2.4 2.4"),
+    ):
+        low, high = limits.split()
+        lower, upper = wider.split()
+        swung = swung.replace(f'lower="{low}" upper="{high}"', f'lower="{lower}" upper="{upper}"')
+    robot = proposed(swung)
+    feet = feet_in_body(
+        robot, np.concatenate([leg.stance for leg in robot.legs if isinstance(leg, ChainLeg)])
+    )
+    hips = np.array([leg.hip for leg in robot.legs])
+    assert (np.abs(feet[:, :2]) > np.abs(hips[:, :2])).all()
+    assert (np.sign(feet[:, :2]) == np.sign(hips[:, :2])).all()
 
 
 def test_a_dog_stands_on_legs_below_its_hips() -> None:

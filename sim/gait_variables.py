@@ -10,116 +10,75 @@ from pydantic import ValidationError
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.scenario import GAIT_NAMES, Scenario
-from gaitswarm.sim.variables import Variable, VariableCatalogue, split_name
+from gaitswarm.sim.variables import (
+    Variable,
+    VariableCatalogue,
+    categorical,
+    numeric,
+    split_name,
+)
 
 GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
-    Variable(name="cycle_time", low=0.9, high=1.7, unit="s", description="Walking cycle."),
-    Variable(
-        name="stride",
-        low=0.10,
-        high=0.18,
-        unit="m",
+    numeric("cycle_time", 0.9, 1.7, "s", "Walking cycle."),
+    numeric("stride", 0.10, 0.18, "m", "Stroke on the ground.", by_leg_group=True),
+    numeric("height", 0.01, 0.04, "m", "Height of the swing.", by_leg_group=True),
+    numeric(
+        "duty_factor",
+        0.45,
+        0.75,
+        "1",
+        "Share of the cycle of the phase selected by duty_phase.",
         by_leg_group=True,
-        description="Stroke on the ground.",
     ),
-    Variable(
-        name="height",
-        low=0.01,
-        high=0.04,
-        unit="m",
+    categorical("duty_phase", ("support", "swing"), "Phase to which duty_factor applies."),
+    numeric(
+        "start_phase",
+        0.0,
+        0.95,
+        "1",
+        "Share of the cycle at which the gait starts: which legs swing first.",
         by_leg_group=True,
-        description="Height of the swing.",
     ),
-    Variable(
-        name="duty_factor",
-        low=0.45,
-        high=0.75,
-        unit="1",
+    categorical("curve", ("quadratic_spline", "half_ellipse", "cycloid"), "Shape of the swing."),
+    numeric("fir_ms", 4, 300, "ms", "Low-pass FIR filter of the desired angles.", kind="integer"),
+    categorical(
+        "fir_window",
+        ("moving_average", "hamming"),
+        "Coefficients of the filter: all equal, or those of Matlab's fir1.",
+    ),
+    numeric("trajectory_rate", 20.0, 500.0, "Hz", "Update rate of the desired angles."),
+    categorical(
+        "gait", GAIT_NAMES, "Order of the legs' steps; own is the order in the robot's description."
+    ),
+    numeric("hip_height", 0.10, 0.20, "m", "Height of the coxa axes above the ground."),
+    numeric(
+        "radius",
+        0.12,
+        0.22,
+        "m",
+        "Lateral distance of the feet from the body's long axis.",
         by_leg_group=True,
-        description="Share of the cycle of the phase selected by duty_phase.",
     ),
-    Variable(
-        name="duty_phase",
-        kind="categorical",
-        choices=("support", "swing"),
-        description="Phase to which duty_factor applies.",
+    numeric(
+        "sway_lateral",
+        0.0,
+        0.04,
+        "m",
+        "Amplitude of the body's sway to the left and right, once per cycle.",
     ),
-    Variable(
-        name="start_phase",
-        low=0.0,
-        high=0.95,
-        unit="1",
-        by_leg_group=True,
-        description="Share of the cycle at which the gait starts: which legs swing first.",
+    numeric(
+        "sway_longitudinal",
+        0.0,
+        0.04,
+        "m",
+        "Amplitude of the body's sway along the walk, twice per cycle.",
     ),
-    Variable(
-        name="curve",
-        kind="categorical",
-        choices=("quadratic_spline", "half_ellipse", "cycloid"),
-        description="Shape of the swing.",
-    ),
-    Variable(
-        name="fir_ms",
-        low=4,
-        high=300,
-        unit="ms",
-        kind="integer",
-        description="Low-pass FIR filter of the desired angles.",
-    ),
-    Variable(
-        name="fir_window",
-        kind="categorical",
-        choices=("moving_average", "hamming"),
-        description="Coefficients of the filter: all equal, or those of Matlab's fir1.",
-    ),
-    Variable(
-        name="trajectory_rate",
-        low=20.0,
-        high=500.0,
-        unit="Hz",
-        description="Update rate of the desired angles.",
-    ),
-    Variable(
-        name="gait",
-        kind="categorical",
-        choices=GAIT_NAMES,
-        description="Order of the legs' steps; own is the order in the robot's description.",
-    ),
-    Variable(
-        name="hip_height",
-        low=0.10,
-        high=0.20,
-        unit="m",
-        description="Height of the coxa axes above the ground.",
-    ),
-    Variable(
-        name="radius",
-        low=0.12,
-        high=0.22,
-        unit="m",
-        by_leg_group=True,
-        description="Lateral distance of the feet from the body's long axis.",
-    ),
-    Variable(
-        name="sway_lateral",
-        low=0.0,
-        high=0.04,
-        unit="m",
-        description="Amplitude of the body's sway to the left and right, once per cycle.",
-    ),
-    Variable(
-        name="sway_longitudinal",
-        low=0.0,
-        high=0.04,
-        unit="m",
-        description="Amplitude of the body's sway along the walk, twice per cycle.",
-    ),
-    Variable(
-        name="sway_phase",
-        low=0.0,
-        high=0.95,
-        unit="1",
-        description="Share of the cycle at which the body is furthest to the left.",
+    numeric(
+        "sway_phase",
+        0.0,
+        0.95,
+        "1",
+        "Share of the cycle at which the body is furthest to the left.",
     ),
 )
 """Gait parameters that a design may set besides the controller's, the first as in thesis table 3.2.

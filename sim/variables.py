@@ -205,6 +205,16 @@ class Variable(BaseModel):
         return self.choices[round(number)]
 
 
+def numeric(
+    name: str, low: float, high: float, unit: str, description: str, **options: Any
+) -> Variable:
+    return Variable(name=name, low=low, high=high, unit=unit, description=description, **options)
+
+
+def categorical(name: str, choices: tuple[str, ...], description: str) -> Variable:
+    return Variable(name=name, kind="categorical", choices=choices, description=description)
+
+
 def split_name(name: str) -> tuple[str, str | None]:
     """Split a variable's name from its group of legs: `stride[front]` is `stride`, `front`."""
     base, bracket, group = name.partition("[")

@@ -24,119 +24,72 @@ from gaitswarm.sim.robot.description import (
     RobotDescription,
 )
 from gaitswarm.sim.robot.robot import Robot
-from gaitswarm.sim.variables import Variable
+from gaitswarm.sim.variables import Variable, categorical, numeric
 
 _WHOLE: Final = (
-    Variable(
-        name="battery_voltage",
-        low=8.0,
-        high=13.0,
-        unit="V",
-        description="Open-circuit voltage of the battery.",
-    ),
-    Variable(
-        name="battery_resistance",
-        low=0.02,
-        high=0.6,
-        unit="ohm",
-        description="Internal resistance of the battery.",
-    ),
-    Variable(name="body_mass", low=2.0, high=6.0, unit="kg", description="Mass of the body."),
+    numeric("battery_voltage", 8.0, 13.0, "V", "Open-circuit voltage of the battery."),
+    numeric("battery_resistance", 0.02, 0.6, "ohm", "Internal resistance of the battery."),
+    numeric("body_mass", 2.0, 6.0, "kg", "Mass of the body."),
 )
 
-_EFFICIENCY: Final = Variable(
-    name="efficiency", low=0.25, high=0.98, unit="1", description="Efficiency of the gearhead of"
-)  # fmt: skip
+_EFFICIENCY: Final = numeric("efficiency", 0.25, 0.98, "1", "Efficiency of the gearhead of")
 
-_FRICTION: Final = Variable(
-    name="viscous_friction",
-    low=0.0,
-    high=0.5,
-    unit="N m s/rad",
-    description="Viscous friction of the torque-controlled actuator of",
+_FRICTION: Final = numeric(
+    "viscous_friction",
+    0.0,
+    0.5,
+    "N m s/rad",
+    "Viscous friction of the torque-controlled actuator of",
 )
 
 _CONTACT: Final = {
-    "stiffness": Variable(
-        name="stiffness",
-        low=1000.0,
-        high=20_000.0,
-        unit="N/m",
-        description="Stiffness of the sole of",
-    ),
-    "damping": Variable(
-        name="damping", low=50.0, high=3000.0, unit="N s/m", description="Damping of the sole of"
-    ),
-    "sole": Variable(
-        name="sole", low=0.004, high=0.016, unit="m", description="Length of the sole's spring of"
-    ),
-    "friction": Variable(
-        name="friction", low=0.05, high=3.0, unit="1", description="Friction of the foot of"
-    ),
+    "stiffness": numeric("stiffness", 1000.0, 20_000.0, "N/m", "Stiffness of the sole of"),
+    "damping": numeric("damping", 50.0, 3000.0, "N s/m", "Damping of the sole of"),
+    "sole": numeric("sole", 0.004, 0.016, "m", "Length of the sole's spring of"),
+    "friction": numeric("friction", 0.05, 3.0, "1", "Friction of the foot of"),
 }
 
 _DRY_FRICTION: Final = ("coulomb_friction", "stribeck_friction", "load_friction")
 
 CONVENTIONAL_VARIABLES: Final = (
-    Variable(
-        name="efficiency",
-        low=_EFFICIENCY.low,
-        high=_EFFICIENCY.high,
-        unit="1",
-        description="Efficiency of every gearhead; that of a single joint takes precedence.",
+    numeric(
+        "efficiency",
+        _EFFICIENCY.low,
+        _EFFICIENCY.high,
+        "1",
+        "Efficiency of every gearhead; that of a single joint takes precedence.",
     ),
-    Variable(
-        name="coulomb_friction",
-        low=0.0,
-        high=1.0,
-        unit="N m",
-        description="Dry friction of every gearhead, at its output.",
+    numeric("coulomb_friction", 0.0, 1.0, "N m", "Dry friction of every gearhead, at its output."),
+    numeric("stribeck_friction", 0.0, 1.0, "N m", "Further dry friction at rest."),
+    numeric(
+        "load_friction",
+        0.0,
+        0.5,
+        "1",
+        "Dry friction of every gearhead per torque on both its sides.",
     ),
-    Variable(
-        name="stribeck_friction",
-        low=0.0,
-        high=1.0,
-        unit="N m",
-        description="Further dry friction at rest.",
+    categorical(
+        "energy", get_args(EnergyConvention), "Electrical power of each motor that counts as spent."
     ),
-    Variable(
-        name="load_friction",
-        low=0.0,
-        high=0.5,
-        unit="1",
-        description="Dry friction of every gearhead per torque on both its sides.",
+    categorical("contact_law", get_args(ContactLaw), "Friction law of the soles."),
+    numeric(
+        "slip_velocity",
+        0.01,
+        0.2,
+        "m/s",
+        "Velocity from which friction of every foot is full (v_lin).",
     ),
-    Variable(
-        name="energy",
-        kind="categorical",
-        choices=get_args(EnergyConvention),
-        description="Electrical power of each motor that counts as spent.",
+    numeric(
+        "current_filter",
+        0.0,
+        0.05,
+        "s",
+        "Time constant of the low-pass of the current before the ADC.",
     ),
-    Variable(
-        name="contact_law",
-        kind="categorical",
-        choices=get_args(ContactLaw),
-        description="Friction law of the soles.",
-    ),
-    Variable(
-        name="slip_velocity",
-        low=0.01,
-        high=0.2,
-        unit="m/s",
-        description="Velocity from which friction of every foot is full (v_lin).",
-    ),
-    Variable(
-        name="current_filter",
-        low=0.0,
-        high=0.05,
-        unit="s",
-        description="Time constant of the low-pass of the current before the ADC.",
-    ),
-    Variable(
-        name="planned_soles",
-        kind="categorical",
-        choices=get_args(PlannedSoles),
-        description="Sole lengths that gaits assume: nominal, or each leg's own.",
+    categorical(
+        "planned_soles",
+        get_args(PlannedSoles),
+        "Sole lengths that gaits assume: nominal, or each leg's own.",
     ),
 )
 """Values for the whole robot that the thesis omits, or gives more than once."""

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised, synchronise
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 Floats = NDArray[np.float64]
@@ -265,19 +265,6 @@ class Comparison(_Data):
             if known.quantity is quantity:
                 return known
         raise KeyError(quantity)
-
-
-def compare(
-    measured: MeasuredLog,
-    simulated: MeasuredLog,
-    cycle_time: float,
-    *,
-    repeats: Sequence[MeasuredLog] = (),
-) -> Comparison:
-    """Synchronise two logs, and compare all quantities that were measured."""
-    pair = synchronise(measured, simulated, cycle_time)
-    others = [synchronise(repeat, simulated, cycle_time).measured for repeat in repeats]
-    return compare_synchronised(pair, others)
 
 
 def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()) -> Comparison:

@@ -8,11 +8,12 @@ import pytest
 
 from gaitswarm.cli.main import run
 from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.sim.validation import Tolerance, compare
+from gaitswarm.sim.validation import Tolerance
 from scripts.measured_logs import format_measured_log
 from tests.examples.commands import Result, run_command, synthesize
 from tests.examples.paths import QUADRUPED
 from tests.validation.conftest import TwoWalks
+from tests.validation.walks import compare
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ import pytest
 
 from gaitswarm.sim import validation as measures
 from gaitswarm.sim.measurement.measured_log import Quantity
-from gaitswarm.sim.validation import N_HARMONICS, Tolerance, compare
-from tests.validation.walks import CYCLE_TIME, szabadka, walking_log, without_supplements
+from gaitswarm.sim.validation import N_HARMONICS, Tolerance
+from tests.validation.walks import CYCLE_TIME, compare, szabadka, walking_log, without_supplements
 
 LOG = walking_log(szabadka())
 

@@ -10,7 +10,7 @@ import pytest
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import Quantity, simulated_log
-from gaitswarm.sim.validation import Tolerance, compare
+from gaitswarm.sim.validation import Tolerance
 from scripts.synthesize import (
     Instruments,
     Perturbation,
@@ -20,6 +20,7 @@ from scripts.synthesize import (
 )
 from tests.examples.walks import PUBLISHED_A, logged_walk
 from tests.validation.conftest import TwoWalks
+from tests.validation.walks import compare
 
 pytestmark = pytest.mark.slow
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import resources
 
 import numpy as np
 
-from gaitswarm.sim.measurement.measured_log import MeasuredLog
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, synchronise
 from gaitswarm.sim.robot import Robot, load_robot, parse_robot
+from gaitswarm.sim.validation import Comparison, compare_synchronised
 
 CYCLE_TIME = 0.5
 CYCLE = 250
@@ -62,3 +64,16 @@ def without_supplements(log: MeasuredLog) -> MeasuredLog:
         body_rate=None,
         battery_current=None,
     )
+
+
+def compare(
+    measured: MeasuredLog,
+    simulated: MeasuredLog,
+    cycle_time: float,
+    *,
+    repeats: Sequence[MeasuredLog] = (),
+) -> Comparison:
+    """Synchronise two logs, and compare all quantities that were measured."""
+    pair = synchronise(measured, simulated, cycle_time)
+    others = [synchronise(repeat, simulated, cycle_time).measured for repeat in repeats]
+    return compare_synchronised(pair, others)

@@ -83,8 +83,6 @@ def simulate(
     place: Place,
 ) -> Printed:
     """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
-    from pydantic import ValidationError
-
     from gaitswarm.cli.inputs import (
         given_design,
         json_object,
@@ -92,9 +90,9 @@ def simulate(
         robot_defaults,
         scenario_data,
     )
-    from gaitswarm.errors import invalid_request
     from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
+    from gaitswarm.specs import checked
 
     given = given_design(design, controller, trajectory, robot=robot, place=place)
     data: dict[str, Any] = {
@@ -115,11 +113,7 @@ def simulate(
     if world is not None:
         document = json_object(world, "world")
         data["world"] = document.get("values", document)
-    try:
-        request = SimulationRequest.model_validate(data)
-    except ValidationError as error:
-        raise invalid_request(error) from error
-    view = run_simulation(request)
+    view = run_simulation(checked(SimulationRequest, data))
     return without_logs(view, log), _simulated(view)
 
 
@@ -189,11 +183,9 @@ class SampleOptions:
 
     def request(self, given: GivenDesign) -> RobustnessRequest:
         """Return the request for a design; a job's best uses the job's scenarios and robot."""
-        from pydantic import ValidationError
-
         from gaitswarm.cli.inputs import robot_defaults, scenario_data
-        from gaitswarm.errors import invalid_request
         from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest
+        from gaitswarm.specs import checked
 
         scenarios: Any = scenario_data(self.scenarios or "all", self.robot)
         if given.spec is None:
@@ -203,7 +195,7 @@ class SampleOptions:
             variables = given.spec.design_space().variables
             if self.scenarios is None:
                 scenarios = given.spec.resolved_scenarios()
-        data: dict[str, Any] = {
+        data = {
             "controller": given.controller,
             "design": given.values,
             "samples": self.samples,
@@ -214,10 +206,7 @@ class SampleOptions:
             "robot": given.robot(self.robot),
             "variables": variables,
         }
-        try:
-            return RobustnessRequest.model_validate(data)
-        except ValidationError as error:
-            raise invalid_request(error) from error
+        return checked(RobustnessRequest, data)
 
 
 def robustness(

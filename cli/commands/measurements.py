@@ -200,13 +200,7 @@ def identify(
         "recordings": recordings,
         "variables": None if variables is None else variables.split(","),
         "links": [int(link) if link.isdecimal() else link for link in links.split(",")],
-        # Explore first, then converge: there are many parameters, and one valley.
-        "optimizer": {
-            "name": "pso",
-            "particles": particles,
-            "inertia_start": 0.9,
-            "inertia_end": 0.4,
-        },
+        "optimizer": _swarm(particles),
         "iterations": iterations,
         "precision": precision or "double",
     }
@@ -217,6 +211,12 @@ def identify(
         return view, _parameters(view, true_values)
 
     return run_seeds(specs, workers, report, report_command="parameters")
+
+
+def _swarm(particles: int) -> dict[str, Any]:
+    """Explore first, then converge: there are many parameters, and one valley."""
+    inertia = {"inertia_start": 0.9, "inertia_end": 0.4}
+    return {"name": "pso", "particles": particles, **inertia}
 
 
 def parameters(
@@ -440,13 +440,7 @@ def calibrate(
         **read_targets(table),
         **_robots(robot),
         "fixed": dict(name_and_value(entry, "fixed") for entry in _entries(fixed)),
-        # Explore first, then converge, as for identification.
-        "optimizer": {
-            "name": "pso",
-            "particles": particles,
-            "inertia_start": 0.9,
-            "inertia_end": 0.4,
-        },
+        "optimizer": _swarm(particles),
         "iterations": iterations,
         "precision": precision or "double",
     }

@@ -326,12 +326,7 @@ class Spec(BaseModel):
 
     @abstractmethod
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Return fitness and utilities of n designs.
-
-        Args:
-            objectives: (n, K, m) raw objectives.
-            failed: (n, K), true for a case without a result.
-        """
+        """Return fitness and utilities of n designs from (n, K, m) results, (n, K) failed."""
 
     def violations(self, results: Floats, failed: NDArray[np.bool_]) -> Floats | None:
         """Return by how much n designs violate the job's constraints (n,).

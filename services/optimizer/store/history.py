@@ -68,10 +68,7 @@ _STATUSES: Final = frozenset(Status)
 
 
 class History(Aggregate):
-    """Committed iterations, which never change.
-
-    A long history is read in pieces, each a transaction of its own, that fit together.
-    """
+    """Committed iterations, which never change; a long history is read in several transactions."""
 
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
@@ -114,11 +111,7 @@ class History(Aggregate):
             return _select_columns(connection, job_id, first, last)
 
     def best(self, job_id: str) -> Evaluation | None:
-        """Return the design of least fitness in double precision, the earliest of equals.
-
-        With its reevaluation if the job searches in single precision. None if every design has
-        failed.
-        """
+        """Return the earliest design of least fitness in double precision, with reevaluation."""
         with self._database.read("best") as connection:
             require_job(connection, job_id)
             place = select(jobs.c.best_iteration, jobs.c.best_particle).where(jobs.c.id == job_id)
@@ -148,10 +141,7 @@ class History(Aggregate):
             return _select_reevaluations(connection, job_id, first, last)
 
     def known(self, keys: Sequence[bytes]) -> dict[bytes, Outcome]:
-        """Return the outcomes of designs that any job has simulated; a row for each case.
-
-        keys: from `walk_keys`.
-        """
+        """Return the outcomes of designs that any job has simulated; a row for each case."""
         table, outcomes = evaluations.c, dict[bytes, Outcome]()
         columns = (table.walk_key, table.objectives, table.statuses)
         with self._database.read("known") as connection:
@@ -170,10 +160,7 @@ class History(Aggregate):
             return chain_documents(job_row(connection, job_id))
 
     def links(self, job_id: str, first: int, last: int) -> tuple[Link, ...]:
-        """Return a range of iterations, including the current one, without evaluations.
-
-        Raises ValueError for a damaged one.
-        """
+        """Return a range of iterations, including the current one; ValueError for a damaged one."""
         with self._database.read("links") as connection:
             return _select_links(connection, job_id, first, last)
 
@@ -310,8 +297,7 @@ def complete_iteration(
 ) -> dict[str, Any]:
     """Store the results of the open ask; return changed columns of the job. Raises Conflict.
 
-    Clears the optimizer's state of the iteration before: a job continues from its open ask or, if
-    extended, from its last committed one, and states may grow with every iteration.
+    Clears the optimizer's state of the iteration before, as states may grow with every iteration.
     """
     asked = select(iterations.c.designs, iterations.c.positions, iterations.c.ask_digest)
     open_iteration = _at(job["id"], done.iteration) & iterations.c.committed_at.is_(None)

@@ -285,9 +285,8 @@ class Jobs(Aggregate):
     ) -> Job:
         """Change a job's budget and return it, queued if it had succeeded; see `extended`.
 
-        Committed iterations and the open ask stay; later asks are made under the new budget, as
-        the runner detects it at its next commit. Raises Conflict for a cancelled job,
-        InvalidRequest for a budget that is spent or impossible, and Unreadable.
+        Later asks are made under the new budget, as the runner detects it at its next commit.
+        Raises Conflict, InvalidRequest for a budget that is spent or impossible, and Unreadable.
         """
         with self._database.write("extend") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -306,10 +305,7 @@ class Jobs(Aggregate):
             return to_job(update_job(connection, row, changes))
 
     def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
-        """Change a job's priority, which its runner reads at the next renewal.
-
-        Raises Conflict for a job that has ended.
-        """
+        """Change a job's priority, which its runner reads at the next renewal. Raises Conflict."""
         with self._database.write("prioritize") as connection:
             row = job_row(connection, job_id, lock=True)
             state = JobState(row["state"])
@@ -348,10 +344,9 @@ class Jobs(Aggregate):
             return to_job(update_job(connection, row, {"kept": kept}))
 
     def delete_job(self, job_id: str, *, actor: str = LOCAL) -> None:
-        """Delete a job with its history; forks have copies of theirs.
+        """Delete a job with its history, whose rows `purge_deleted` removes; forks have copies.
 
-        The job is invisible, and its idempotency key free, once this returns. `purge_deleted`
-        removes its rows. Raises Conflict if it is queued, running, pausing or kept.
+        Raises Conflict if it is queued, running, pausing or kept.
         """
         with self._database.write("delete_job") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -369,11 +364,7 @@ class Jobs(Aggregate):
             _mark_deleted(connection, [jobs.c.id == job_id], self._clock(connection), actor)
 
     def clock_jump(self) -> timedelta | None:
-        """Return by how much the clock has jumped ahead in the last day; None if it has not.
-
-        A day without any change, and less than a day with changes since, counts as a jump: what
-        ended before it may seem older than it is.
-        """
+        """Return the clock's jump ahead in the last day, which a day without changes counts as."""
         changed = jobs.c.updated_at
         with self._database.read("clock_jump") as connection:
             now = self._clock(connection)
@@ -389,10 +380,7 @@ class Jobs(Aggregate):
     def delete_ended_before(
         self, moment: datetime, states: Collection[JobState] = ENDED
     ) -> tuple[str, ...]:
-        """Delete jobs that ended before an aware time in some states, and return their ids.
-
-        As `delete_job`, except kept ones and parents of unfinished forks.
-        """
+        """Delete jobs that ended before an aware time, but kept ones and parents; return ids."""
         fork = jobs.alias("fork")
         unfinished_fork = sa.exists().where(
             fork.c.parent_id == jobs.c.id, fork.c.state.not_in(ENDED), fork.c.deleted_at.is_(None)
@@ -408,11 +396,7 @@ class Jobs(Aggregate):
             return _mark_deleted(connection, expired, self._clock(connection), RETENTION)
 
     def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
-        """Remove rows of deleted jobs in short transactions, using half of the time.
-
-        Several processes may do so at once. `should_stop` is called between transactions; if true,
-        the rest is left to a later call.
-        """
+        """Remove rows of deleted jobs in short transactions, using half of the time."""
         with self._database.read("purge_deleted") as connection:
             more = connection.scalar(_DELETED) is not None
         while more and not should_stop():

@@ -105,10 +105,7 @@ class Leases(Aggregate):
         return claim
 
     def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> Renewal:
-        """Prolong a lease; return the job's state and priority, which users may have changed.
-
-        waiting: reason for waiting, shown to users; None if the job does not wait.
-        """
+        """Prolong a lease; return the job's state and priority, which users may have changed."""
         with self._held("renew", claim) as (connection, row):
             changes: dict[str, Any] = _lease(self._clock(connection), lease_seconds)
             reason = None if waiting is None else storable(waiting)
@@ -118,10 +115,7 @@ class Leases(Aggregate):
             return Renewal(JobState(row["state"]), row["priority"])
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
-        """Record the provenance from the next iteration on, unless it is unchanged.
-
-        Clears the user's acceptance of changes.
-        """
+        """Record the provenance from the next iteration on, and clear the acceptance of changes."""
         with self._held("record_provenance", claim) as (connection, row):
             stored = parsed(row["provenance"]) or ()
             before = RECORDS.validate_python(stored)
@@ -131,11 +125,7 @@ class Leases(Aggregate):
             update_job(connection, row, {"provenance": document, "accepts_changes": False})
 
     def begin(self, claim: Claim, ask: Ask) -> None:
-        """Store the ask of a new job, or of one that continues after an extension. Idempotent.
-
-        Raises BudgetChanged if the job's budget is not the claim's, on which the ask depends, and
-        Conflict for an ask of another than the next iteration.
-        """
+        """Store the ask of a new or extended job. Idempotent. Raises BudgetChanged and Conflict."""
         with self._held("begin", claim) as (connection, row):
             if open_ask(connection, row) is None:
                 _require_budget(claim, row)
@@ -185,10 +175,7 @@ class Leases(Aggregate):
         return state
 
     def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        """Give up a lease; the job fails by an error, or is paused or queued.
-
-        A pausing job becomes paused instead of queued.
-        """
+        """Give up a lease; the job fails by an error, or is paused, also if pausing, or queued."""
         if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
             raise ValueError(f"a runner cannot release a job as {state}")
         with self._held("release", claim) as (connection, row):

@@ -43,10 +43,7 @@ class Outbox(Aggregate):
             return _notification(row)
 
     def settle(self, taken: Notification, error: str | None, *, final: bool = False) -> None:
-        """Record the result of an attempt: delivered without an error, due later, or given up.
-
-        final: whether to give up now.
-        """
+        """Record the result of an attempt: delivered without an error, due later, or given up."""
         attempts = taken.attempts + 1
         pause = None if final or error is None else pause_after(attempts)
         with self._database.write("notification_settle") as connection:

@@ -60,10 +60,7 @@ class Recordings(Aggregate):
         return recording
 
     def recordings(self, ids: Sequence[str]) -> Walks:
-        """Return recorded walks by id.
-
-        Raises NotFound, which names the first, and Unreadable for a damaged or later one.
-        """
+        """Return recorded walks by id. Raises NotFound, and Unreadable for a damaged one."""
         with self._database.read("recordings") as connection:
             return load_recordings(connection, ids)
 

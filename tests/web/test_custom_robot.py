@@ -15,12 +15,16 @@ from playwright.sync_api import expect
 from tests.examples.meshes import DAE, OBJ, tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED
 from tests.examples.servers import ServerProcess
+from tests.robots.test_obstacles import LIMITS, longer
 from tests.robots.test_proposal import dog
 from tests.web.pixels import painted
 from tests.web.test_job import open_advanced
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
+
+UNEVEN = longer(f'type="revolute">{LIMITS}', legs=("FL", "FR", "RL"))
+"""A dog of which three legs have a joint more than the last."""
 
 MESHES = {"body.stl": tetrahedron(0.1), "plate.obj": OBJ, "sheet.dae": DAE}
 
@@ -138,3 +142,27 @@ def test_a_urdf_is_simulated_and_submitted(
     spec = server.job(page.url.rsplit("/", 1)[1])["spec"]
     assert "load_height = 0.07" in spec["robot"]["toml"]
     assert [scenario["name"] for scenario in spec["scenarios"]] == ["slow", "fast"]
+
+
+def test_a_robot_with_surplus_joints_is_made_with_hints(
+    server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    (tmp_path / "dog.urdf").write_text(UNEVEN, encoding="utf-8")
+    page = visit(server.url, allowed="422").go("/jobs/new")
+    page.get_by_role("button", name="My robot").click()
+    page.get_by_label("URDF, xacro or MJCF").set_input_files(tmp_path / "dog.urdf")
+    error = page.get_by_role("alert").filter(has_text="Could not create a robot from dog.urdf.")
+    expect(error).to_contain_text("hold surplus ones, as `--lock FL_toe_joint=0`")
+    held = page.get_by_label("Held joints", exact=True)
+    generate = page.get_by_role("button", name="Generate robot.toml")
+    held.fill("*_toe_joint=low")
+    generate.click()
+    expect(page.get_by_role("alert")).to_contain_text("locks.*_toe_joint")
+    held.fill("F?_toe_joint=0.1 RL_toe_joint=0")
+    page.get_by_label("Mass [kg]").fill("14.5")
+    page.get_by_label("Listed actuators").fill("*=mx64")
+    generate.click()
+    results = page.get_by_role("region", name="Check results")
+    expect(results).to_contain_text("dog: 4 legs, 12 joints, 14.50 kg")
+    expect(results).to_contain_text("FL_toe_joint at 0.1 rad")
+    expect(page.get_by_label("Text of robot.toml")).to_have_value(re.compile("Dynamixel MX-64"))

@@ -16,6 +16,13 @@ import { type ActuatorChoice, useCustomRobot } from './use-custom-robot'
 
 const ACTUATORS = ['auto', 'dc', 'torque'] as const satisfies readonly ActuatorChoice[]
 
+const HINTS = [
+  ['locks', 'Held joints', '*_arm=0.5 head=0', 'JOINT=ANGLE [rad]; surplus joints are held anyway'],
+  ['feet', 'Feet', '*_calf=0,0,-0.2', 'LINK=X,Y,Z, the end of a leg in the link’s frame [m]'],
+  ['mass', 'Mass [kg]', '', 'of the robot, to which all masses are scaled'],
+  ['actuators', 'Listed actuators', '*=mx64 *_coxa=mx106', 'JOINT=NAME'],
+] as const
+
 const BUSY = {
   proposing: 'Detecting legs, stance and actuators…',
   checking: 'Simulating one second of standing…',
@@ -82,12 +89,30 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
           />
         </div>
       </details>
+      <details open={state.problem !== null && robot.toml === ''}>
+        <summary>Held joints, feet, masses</summary>
+        <div class="fields">
+          {HINTS.map(([name, label, placeholder, hint]) => (
+            <TextField
+              key={name}
+              label={label}
+              placeholder={placeholder}
+              hint={hint}
+              value={state.hints[name]}
+              onChange={(text) => state.setHints({ [name]: text })}
+            />
+          ))}
+        </div>
+        <p class="muted small">
+          Names may have the wildcards * and ?; separate entries by spaces, and generate robot.toml.
+        </p>
+      </details>
       {state.problem && (
         <>
           <ErrorNotice {...state.problem} />
           <p class="small">
             {robot.toml === ''
-              ? 'Choose another file, or provide a robot.toml with it.'
+              ? 'Choose another file, give held joints or feet, or provide a robot.toml with it.'
               : 'Edit robot.toml below and check again, or choose another file.'}{' '}
             {manual && <a href="/manual/docs/robot-errors.html">Errors and remedies</a>}
           </p>
@@ -118,9 +143,9 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
             {checked ? 'Check the robot again' : 'Check the robot'}
           </button>
         )}
-        {state.urdf && robot.toml !== '' && (
+        {state.urdf && (
           <button type="button" disabled={state.busy !== null} onClick={state.propose}>
-            Regenerate robot.toml
+            {robot.toml === '' ? 'Generate robot.toml' : 'Regenerate robot.toml'}
           </button>
         )}
         <span class="muted" role="status">

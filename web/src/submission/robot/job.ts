@@ -46,6 +46,29 @@ function objectIn(text: string): Partial<JobSpec> {
   throw new Error('job.json must hold one JSON object')
 }
 
+/** Texts as the options of `gaitswarm robot init` have them, entries separated by spaces. */
+export type Hints = Readonly<Record<'locks' | 'feet' | 'mass' | 'actuators', string>>
+
+/** Fields of a request for a proposal; the server reports numbers that are none. */
+export function hintsOf({ locks, feet, mass, actuators }: Hints) {
+  return {
+    locks: pairs(locks, Number),
+    feet: pairs(feet, (at) => at.split(',').map(Number) as [number, number, number]),
+    mass: mass.trim() === '' ? null : Number(mass),
+    actuators: pairs(actuators, String),
+  }
+}
+
+function pairs<Value>(text: string, read: (value: string) => Value): Record<string, Value> {
+  const entries = text.split(/\s+/).filter((entry) => entry !== '')
+  return Object.fromEntries(
+    entries.map((entry) => {
+      const at = entry.lastIndexOf('=')
+      return [entry.slice(0, at), read(entry.slice(at + 1))]
+    }),
+  )
+}
+
 export const ROBOT_FILES = '.urdf,.xacro,.xml,.mjcf'
 
 let handed: File | null = null

@@ -5,7 +5,7 @@ import { post } from '../../api/client'
 import type { RobotCheck, RobotDraftRequest } from '../../api/types'
 import type { Catalogue } from '../draft/catalogue'
 import type { Draft, RobotDraft } from '../draft/draft'
-import { robotName, takeHanded, textOf, withJob, withRobotJob } from './job'
+import { type Hints, hintsOf, robotName, takeHanded, textOf, withJob, withRobotJob } from './job'
 
 export type ActuatorChoice = NonNullable<RobotDraftRequest['actuator']>
 
@@ -19,6 +19,7 @@ interface State {
   readonly toml: TextFile | null
   readonly job: TextFile | null
   readonly actuator: ActuatorChoice
+  readonly hints: Hints
   readonly busy: 'proposing' | 'checking' | null
   readonly problem: { readonly what: string; readonly error: unknown } | null
   readonly guesses: readonly string[]
@@ -31,6 +32,7 @@ const NOTHING: State = {
   toml: null,
   job: null,
   actuator: 'auto',
+  hints: { locks: '', feet: '', mass: '', actuators: '' },
   busy: null,
   problem: null,
   guesses: [],
@@ -93,10 +95,10 @@ export function useCustomRobot(
     })
 
   const propose = async () => {
-    const { urdf, actuator } = now.current.state
+    const { urdf, actuator, hints } = now.current.state
     if (!urdf) return
     set({ toml: null, guesses: [], checked: null })
-    const body = { name: robotName(urdf.name), urdf: urdf.text, actuator }
+    const body = { name: robotName(urdf.name), urdf: urdf.text, actuator, ...hintsOf(hints) }
     const succeeded = await request(
       'proposing',
       `Could not create a robot from ${urdf.name}.`,
@@ -149,6 +151,8 @@ export function useCustomRobot(
       set({ actuator })
       if (now.current.state.urdf && !now.current.state.toml) void propose()
     },
+    setHints: (changes: Partial<Hints>) =>
+      set({ hints: { ...now.current.state.hints, ...changes } }),
     /** Generate robot.toml from the URDF, replacing the current one. */
     propose: () => void propose(),
     check: () => void check(),

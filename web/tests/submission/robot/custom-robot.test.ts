@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import type { JobSpec, Variable } from '../../../src/api/types'
-import { robotName, startDesign, textOf } from '../../../src/submission/robot/job'
+import { hintsOf, robotName, startDesign, textOf } from '../../../src/submission/robot/job'
 
 describe('a file of a robot', () => {
   test('is read as text', async () => {
@@ -53,4 +53,29 @@ test('a preview design is the middle of the search space, with fixed values', ()
     feed_forward: 0.5,
     stride: 0.1,
   })
+})
+
+describe('hints of a proposal', () => {
+  test('are read as options of the command line', () =>
+    expect(
+      hintsOf({
+        locks: '*_toe=0.5  arm=0',
+        feet: 'FL_calf=0,0,-0.2',
+        mass: '14.5',
+        actuators: '*=mx64 a=b=xl330',
+      }),
+    ).toEqual({
+      locks: { '*_toe': 0.5, arm: 0 },
+      feet: { FL_calf: [0, 0, -0.2] },
+      mass: 14.5,
+      actuators: { '*': 'mx64', 'a=b': 'xl330' },
+    }))
+
+  test('are none by default', () =>
+    expect(hintsOf({ locks: '', feet: ' ', mass: '', actuators: '' })).toEqual({
+      locks: {},
+      feet: {},
+      mass: null,
+      actuators: {},
+    }))
 })

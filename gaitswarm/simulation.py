@@ -22,6 +22,7 @@ from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
 from gaitswarm.services.optimizer.views import DesignValues, View, finite
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -35,8 +36,6 @@ from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.variables import Variable
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput, checked
 from gaitswarm.tables import Table
-
-Floats = NDArray[np.float64]
 
 ALL_SCENARIOS: Final = tuple(scenario.name for scenario in SCENARIOS)
 """The six scenarios of table 4.2."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.variables import Variable
 
@@ -32,7 +33,6 @@ MEDIA_TYPES: Final[dict[TableFormat, str]] = {
     "parquet": "application/vnd.apache.parquet",
 }
 
-Floats = NDArray[np.float64]
 Column = NDArray[Any]
 
 

@@ -19,11 +19,11 @@ from typing import Any, ClassVar, Final
 from unittest import TestCase
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, LongCase, Walk, run_together
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
 from gaitswarm.sim.catalogue import check_design
@@ -35,8 +35,6 @@ from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.sim.simulate import simulate
-
-Floats = NDArray[np.float64]
 
 refused = TestCase().assertRaisesRegex
 

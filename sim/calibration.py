@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from gaitswarm.sim.catalogue import check_design, design_catalogue, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, control_law
@@ -226,9 +226,6 @@ def _planner(source: RobotSource, planned_soles: float | None) -> Robot:
     if planned_soles is None:
         return described
     return with_parameters(described, {_PLANNED: planned_soles})
-
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

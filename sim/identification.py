@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, names_of
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
@@ -153,8 +154,6 @@ def record(
             f"the compared cycles are not a valid recording: {field}: {message_of(first)}"
         ) from error
 
-
-Floats = NDArray[np.float64]
 
 LINK_CURRENTS: Final = tuple(
     Objective(

@@ -9,12 +9,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.shapes import VisibleLink, visible_links
-
-Floats = NDArray[np.float64]
 
 CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
 """Ticks of a log per second [Hz], the highest rate of a replay."""

@@ -11,15 +11,13 @@ from enum import StrEnum
 from typing import Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, Synchronised
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
-
-Floats = NDArray[np.float64]
 
 
 def root_mean_square_error(measured: Floats, simulated: Floats) -> float:

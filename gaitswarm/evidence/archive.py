@@ -35,6 +35,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification import RecordedWalk, Recordings
 from gaitswarm.sim.input import message_of
@@ -144,8 +145,6 @@ _WITH_ROBOTS: Final = (SPEC, CHAIN)
 T = TypeVar("T")
 
 _LINEAGE: Final[TypeAdapter[Lineage | None]] = TypeAdapter(Lineage | None)
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,9 +7,8 @@ Sakakibara, Kan, Hosoda, Hattori and Fujie, "Foot trajectory for a quadruped wal
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 
 def cycloid(

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.gait.trajectory import Trajectory
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
-
-Floats = NDArray[np.float64]
 
 _ON_THE_GROUND: Final = 0.1
 """Share of a foot's lift up to which it counts as on the ground: the filter rounds its path."""

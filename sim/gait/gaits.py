@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.robot import Robot
@@ -191,9 +192,6 @@ def phases_of(robot: Robot, scenario: Scenario) -> tuple[float, ...]:
         return tuple(leg.phase for leg in robot.description.legs)
     # A leg that touches down later is not as far in its cycle.
     return tuple((1.0 - lag) % 1.0 for lag in lags_of(GAITS[scenario.gait], robot.legs))
-
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.robot.legs import ChainLeg
-
-Floats = NDArray[np.float64]
-
 
 _MAX_STEPS: Final = 60
 """Limit of Gauss-Newton steps; a reachable target takes about six."""

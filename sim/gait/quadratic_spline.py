@@ -6,9 +6,8 @@ Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 
 def quadratic_spline(

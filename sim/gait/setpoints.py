@@ -12,9 +12,10 @@ from typing import Final
 
 import numpy as np
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait.trajectory import Floats, desired_angles, stance_angles
+from gaitswarm.sim.gait.trajectory import desired_angles, stance_angles
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 

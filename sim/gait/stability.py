@@ -8,16 +8,14 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.gait.gaits import leg_gaits, supporting
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.posture import feet_and_centre_of_mass
 from gaitswarm.sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 _SAMPLES: Final = 240
 """Number of sampled times in a cycle."""

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
 from gaitswarm.sim.gait.cycloid import cycloid
@@ -21,8 +22,6 @@ from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.legs import ChainLeg, LegKinematics
 from gaitswarm.sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 _BLOCK: Final = 2048
 """Ticks filtered together, so that sums stay in the processor's cache."""

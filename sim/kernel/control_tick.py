@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats, Ints
 from gaitswarm.sim.controllers.base import ControlLaw, JointPd
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
@@ -16,9 +17,6 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import CONTROL_RATE
 from gaitswarm.sim.robot.posture import rotated
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(slots=True)

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.compiler.compilation import Target, load_library
 from gaitswarm.sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
@@ -34,8 +35,6 @@ from gaitswarm.sim.kernel.walk import (
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.terrain import HeightGrid
-
-Floats = NDArray[np.float64]
 
 
 def _fields(kind: Any, *names: str) -> list[tuple[str, Any]]:

@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import DryFriction
@@ -36,8 +36,6 @@ DRY_FRICTION: Final = tuple(DryFriction.model_fields)
 
 SHOVE_DURATION: Final = 0.1
 """Duration of a shove's constant force [s]."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.control_tick import (
     InnerLoop,
     Past,
@@ -33,8 +33,6 @@ from gaitswarm.sim.kernel.walk import (
 )
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
-
-Floats = NDArray[np.float64]
 
 
 class ReferenceKernel:

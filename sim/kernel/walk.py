@@ -13,6 +13,7 @@ from typing import Any, Final, Literal, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats, Ints
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.sensors import NO_ERRORS, SensorErrors
@@ -22,8 +23,6 @@ from gaitswarm.sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
 from gaitswarm.sim.robot.description import EnergyConvention
 from gaitswarm.sim.terrain import HeightGrid
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 T = TypeVar("T")
 
 Precision = Literal["single", "double"]

@@ -17,12 +17,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.measurement.measured_csv import TIME, expected_channels, heading, log_of_columns
 from gaitswarm.sim.measurement.measured_log import MeasuredLog
 from gaitswarm.sim.robot import Robot
-
-Floats = NDArray[np.float64]
 
 LARGEST: Final = 1 << 30
 """Largest unpacked size of an npz file [B]."""

@@ -21,14 +21,12 @@ from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, channels_by_kind
 from gaitswarm.sim.robot import Robot
-
-Floats = NDArray[np.float64]
 
 TIME: Final = "time [s]"
 

@@ -8,8 +8,8 @@ from enum import StrEnum
 from typing import Any, Final, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
@@ -21,8 +21,6 @@ from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import check_reach, simulate
-
-Floats = NDArray[np.float64]
 
 AXES: Final = ("x", "y", "z")
 """Of the body: forward, left, up."""

@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.parameters import DRY_FRICTION
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.robot import JointActuators
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

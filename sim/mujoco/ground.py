@@ -10,9 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.robot.description import ContactLaw
-
-Floats = NDArray[np.float64]
 
 
 class Ground(ABC):

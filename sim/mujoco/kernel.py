@@ -15,8 +15,8 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.control_tick import (
@@ -48,8 +48,6 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.inertia import BodyInertia, parallel_axis
 from gaitswarm.sim.terrain import HeightGrid
-
-Floats = NDArray[np.float64]
 
 RATE: Final = 5_000
 """Steps per second [Hz] of MuJoCo's Euler, whose error is of first order in their length."""

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import Contact
@@ -25,8 +25,6 @@ from gaitswarm.sim.terrain import HeightGrid, height_grid
 
 if TYPE_CHECKING:
     from gaitswarm.sim.robot.shapes import Shape, VisibleLink
-
-Floats = NDArray[np.float64]
 
 Soles = Literal["none", "spheres", "points"]
 """Contact with the ground: none, with external forces on the feet; spheres of the sole's length

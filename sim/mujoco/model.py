@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.sim.gait.gaits import leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
@@ -22,8 +21,6 @@ from gaitswarm.sim.robot.description import Contact
 from gaitswarm.sim.robot.posture import resting_height
 from gaitswarm.sim.robot.shapes import visible_links
 from gaitswarm.sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

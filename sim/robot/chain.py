@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.near_names import nearest
 from gaitswarm.sim.robot.description import Leg
 from gaitswarm.sim.robot.elements import MOST_TURNED, Joint
 from gaitswarm.sim.robot.inertia import BodyInertia, product
 from gaitswarm.sim.robot.urdf import Place, Urdf
-
-Floats = NDArray[np.float64]
 
 _NAMED: Final = 6
 

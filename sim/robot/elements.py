@@ -12,8 +12,8 @@ from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.robot.bounds import LARGEST, shortened
@@ -81,8 +81,6 @@ def _line(text: str, message: str) -> int | None:
     parser.Parse(text, True)
     return line
 
-
-Floats = NDArray[np.float64]
 
 MOST_TURNED: Final = 4.0 * math.pi
 """Largest plausible angle: two turns [rad]. Larger ones are degrees, or mean no limit."""

@@ -9,9 +9,8 @@ from functools import lru_cache
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 _MIDDLE: Final = 1e-6
 """Distance from the body's long axis within which a foot is on neither side [m]."""

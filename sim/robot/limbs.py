@@ -10,8 +10,8 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.robot.chain import Placement, chain_of, check_joints
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.inertia import parallel_axis
@@ -19,7 +19,6 @@ from gaitswarm.sim.robot.robot import Robot
 
 _NOISE: Final = 1e-14
 
-Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 

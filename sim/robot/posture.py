@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.robot.chain import chain_of
 from gaitswarm.sim.robot.legs import turned
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.terrain import HeightGrid
-
-Floats = NDArray[np.float64]
 
 
 def feet_in_body(robot: Robot, joints: Floats) -> Floats:

@@ -12,9 +12,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.input import message_of, with_known_keys
 from gaitswarm.sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
@@ -142,8 +142,6 @@ def _meaning(location: tuple[str | int, ...]) -> str | None:
             return part.model_fields[field].description
     return None
 
-
-Floats = NDArray[np.float64]
 
 _DEGREES: Final = "; it seems to be in degrees: 45 degrees are 0.7854 rad"
 

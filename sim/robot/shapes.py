@@ -11,9 +11,9 @@ from typing import Annotated, Final, Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.robot.chain import chain_of
@@ -22,8 +22,6 @@ from gaitswarm.sim.robot.elements import origin_of
 from gaitswarm.sim.robot.legs import LegKinematics
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.urdf import Link, SolidKind
-
-Floats = NDArray[np.float64]
 
 Colour = tuple[float, float, float, float]
 """Red, green, blue and opacity, 0 to 1."""

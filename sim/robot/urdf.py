@@ -10,8 +10,8 @@ from typing import Final, Literal, cast
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.robot.bounds import check_urdf, shortened
 from gaitswarm.sim.robot.elements import (
@@ -25,8 +25,6 @@ from gaitswarm.sim.robot.elements import (
     with_line,
 )
 from gaitswarm.sim.robot.inertia import NO_INERTIA, BodyInertia, product
-
-Floats = NDArray[np.float64]
 
 GeometryUse = Literal["visual", "collision"]
 SolidKind = Literal["box", "sphere", "cylinder", "capsule"]

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
 from gaitswarm.sim.kernel.dynamics.body import body_of, body_state
 from gaitswarm.sim.kernel.dynamics.limb import links_at
@@ -25,7 +26,7 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
     scale,
     vector,
 )
-from gaitswarm.sim.kernel.parameters import Floats, gravity_on, pack_parameters
+from gaitswarm.sim.kernel.parameters import gravity_on, pack_parameters
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.limbs import limbs_of
 from tests.examples.walks import STEEP, random_state

@@ -9,13 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, judge, plan_walk
 from gaitswarm.sim.compiler.compilation import Target, load_library, target, vector_header
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.native import NativeKernel, load_kernel, native_kernel
-from gaitswarm.sim.kernel.walk import Floats, Precision, WalkSetup
+from gaitswarm.sim.kernel.walk import Precision, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
 from gaitswarm.sim.scenario import SCENARIOS

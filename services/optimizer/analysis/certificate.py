@@ -27,12 +27,11 @@ from gaitswarm.services.optimizer.views import (
     StatusName,
     View,
 )
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.mujoco.engines import ENGINES
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotSource
-
-Floats = NDArray[np.float64]
 
 QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 

@@ -25,8 +25,7 @@ from gaitswarm.services.optimizer.views import (
     View,
     framed,
 )
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 

@@ -21,7 +21,6 @@ from itertools import chain, zip_longest
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import (
     Conflict,
@@ -45,8 +44,7 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
 from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging, stored_state
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 
 def retraced(

@@ -30,8 +30,8 @@ from gaitswarm.services.optimizer.views import (
     Request,
     View,
 )
+from gaitswarm.sim.arrays import Floats
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _BLOCK: Final = 1024

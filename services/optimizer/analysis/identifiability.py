@@ -22,8 +22,6 @@ from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.variables import Variable
 
-Floats = NDArray[np.float64]
-
 THRESHOLDS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
 """Relative distances from a run's best fitness."""
 

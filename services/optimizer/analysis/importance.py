@@ -28,9 +28,8 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import View
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.variables import Variable
-
-Floats = NDArray[np.float64]
 
 LEAST_DESIGNS: Final = 20
 """Minimum number of designs for an estimate."""

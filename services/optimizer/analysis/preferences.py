@@ -25,9 +25,9 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import Finite, View
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _DRAWN: Final = 512

@@ -18,8 +18,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate, ScenarioWeights
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 
 class RankingRequest(Request):

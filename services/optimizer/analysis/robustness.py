@@ -28,6 +28,7 @@ from gaitswarm.services.optimizer.jobs.sensitivity import (
 )
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel.walk import Precision
@@ -36,7 +37,6 @@ from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
 
-Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _RESAMPLES: Final = 400

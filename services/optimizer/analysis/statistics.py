@@ -6,9 +6,8 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 CONFIDENCE: Final = 0.95
 """Level of intervals."""

@@ -20,8 +20,6 @@ from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View
 from gaitswarm.sim.outcome import Status
 
-Floats = NDArray[np.float64]
-
 LeaveOut = Literal["target", "walk"]
 """What is left out together: one target, or all targets of a walk."""
 

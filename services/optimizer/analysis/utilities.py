@@ -20,9 +20,8 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, PREFERENCES, Preference
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.outcome import OBJECTIVES
-
-Floats = NDArray[np.float64]
 
 PreferenceOwner = Literal["job", "A", "B", "C"]
 

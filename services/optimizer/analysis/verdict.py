@@ -11,7 +11,6 @@ from itertools import chain
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.bounds import (
@@ -29,9 +28,8 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.views import Finite, JobName, View
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS
-
-Floats = NDArray[np.float64]
 
 Judgement = Literal["better", "same", "worse"]
 

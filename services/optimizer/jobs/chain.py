@@ -24,12 +24,11 @@ from cbor2 import CBOREncoder, CBORTag
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, Reevaluation
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.outcome import Status
 
 VERSION: Final = 1
 """Of the encoding; part of every digest."""
-
-Floats = NDArray[np.float64]
 
 _DIMENSIONS, _UINT8, _FLOAT64 = 40, 64, 86
 """Array tags of RFC 8746."""

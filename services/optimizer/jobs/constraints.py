@@ -13,7 +13,6 @@ from itertools import product
 from typing import Annotated, Final, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -25,12 +24,11 @@ from pydantic import (
     model_validator,
 )
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Objective
 from gaitswarm.sim.variables import VariableName, VariableValue
-
-Floats = NDArray[np.float64]
 
 ALL: Final = "*"
 """All scenarios; all of f1 to f5."""

@@ -10,10 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Outcome, Status
-
-Floats = NDArray[np.float64]
 
 SUMMARY: Final = (
     *("best", "mean", "median", "worst", "best_so_far", "failed", "infeasible", "least_violation"),

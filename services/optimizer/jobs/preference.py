@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import NAME, OWN, alternatives
 from gaitswarm.sim.outcome import Outcome, Status
-
-Floats = NDArray[np.float64]
 
 _PIECE: Final = 4096
 """Values converted at a time, so that other Python threads can run in between."""

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.variables import Variable
-
-Floats = NDArray[np.float64]
 
 _SAMPLE = 0x10CA1
 

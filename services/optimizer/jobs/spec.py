@@ -34,6 +34,7 @@ from gaitswarm.services.optimizer.search.registry import (
     chosen_method,
     create_search,
 )
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import check_precision
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.errors import SimulationInputError
@@ -90,8 +91,6 @@ StartChoice = Annotated[
         custom_error_message="must be a list of designs, or an object that names earlier jobs",
     ),
 ]
-
-Floats = NDArray[np.float64]
 
 DECISIVE: Final = 0.05
 """Relative distance from the best fitness within which designs count as equally good."""

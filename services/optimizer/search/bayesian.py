@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.search.cma_es import CmaEs, CmaEsSettings
@@ -16,9 +15,8 @@ from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.replayed import Proposals, Start
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
-
-Floats = NDArray[np.float64]
 
 _LONGEST: Final = 1.6
 _FIRST: Final = 0.8

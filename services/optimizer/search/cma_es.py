@@ -20,9 +20,8 @@ from gaitswarm.services.optimizer.search.stateful import (
     GenerationState,
     Numbers,
 )
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
-
-Floats = NDArray[np.float64]
 
 _SAMPLE: Final = 5
 _RESTART: Final = 6

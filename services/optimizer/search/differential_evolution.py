@@ -19,8 +19,7 @@ from gaitswarm.services.optimizer.search.stateful import (
     Numbers,
     Points,
 )
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 _EVOLVE: Final = 4
 """Purpose of random streams: never renumbered, or stored jobs would change their future."""

@@ -24,8 +24,8 @@ from gaitswarm.services.optimizer.search.stateful import (
     GenerationState,
     Points,
 )
+from gaitswarm.sim.arrays import Floats
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _VARY: Final = 7

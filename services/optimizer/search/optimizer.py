@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.search.space import Space
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 
 class SearchSettings(BaseModel):

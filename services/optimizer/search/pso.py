@@ -19,8 +19,7 @@ from gaitswarm.services.optimizer.search.stateful import (
     Numbers,
     Points,
 )
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 _SCATTER: Final = 1
 _MOVE: Final = 2

@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
-
-Floats = NDArray[np.float64]
 
 _DOUBLE_BITS: Final = 53
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias, Union
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Discriminator, Tag
 
 from gaitswarm.services.optimizer.search.bayesian import BayesianSettings, bayesian
@@ -24,6 +22,7 @@ from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.plugins import (
     MISSING,
     KnownName,
@@ -34,8 +33,6 @@ from gaitswarm.sim.plugins import (
     check_name,
     version_of,
 )
-
-Floats = NDArray[np.float64]
 
 Create = Callable[[Any, Space, int, int], Optimizer]
 """(settings, space, budget [evaluations], seed) -> an optimizer before its first ask."""

@@ -11,15 +11,13 @@ from hashlib import blake2b
 from typing import Any, Final, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_start
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.services.optimizer.search.stateful import Fitness, SearchState, Stateful
-
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 Proposals = Generator[Floats, Floats, None]
 """Yields positions (n, d) inside the bounds, n >= 1; receives their fitness (n,). Never ends."""

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
 
 Kind = Literal["continuous", "integer", "categorical"]
 

@@ -24,9 +24,8 @@ from gaitswarm.services.optimizer.search.optimizer import (
     checked_start,
 )
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import message_of
-
-Floats = NDArray[np.float64]
 
 
 def _numbers(value: Any) -> Floats:

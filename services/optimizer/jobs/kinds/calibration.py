@@ -22,6 +22,7 @@ from gaitswarm.services.optimizer.jobs.preference import (
     judge,
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.calibration import (
     QUANTITIES,
     CalibrationWalk,
@@ -43,8 +44,6 @@ from gaitswarm.sim.robot.variant import RobotName
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import check_drives, check_gait, check_reach
 from gaitswarm.sim.variables import Variable
-
-Floats = NDArray[np.float64]
 
 _COLUMNS: Final = {result.name: column for column, result in enumerate(RESULTS)}
 

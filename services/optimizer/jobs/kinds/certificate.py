@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any, Final, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from gaitswarm.services.optimizer.errors import simulation_errors
@@ -20,6 +19,7 @@ from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
 from gaitswarm.services.optimizer.search.stateful import CountedState, Stateful
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -137,9 +137,6 @@ def _changes(base: Scenario, mass: float) -> Iterator[tuple[str, dict[str, Any]]
 
 def _unnamed(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"name": ""})
-
-
-Floats = NDArray[np.float64]
 
 
 def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpace:

@@ -12,14 +12,13 @@ from pydantic import ConfigDict, Field, model_validator
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.preference import Judgement
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.identification import LINK_CURRENTS, CurrentFit, Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import Objective
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
-
-Floats = NDArray[np.float64]
 
 RecordingId = Annotated[
     str,

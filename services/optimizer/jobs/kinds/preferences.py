@@ -34,14 +34,13 @@ from gaitswarm.services.optimizer.jobs.sensitivity import local_sample, sensitiv
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.bayesian import BayesianSettings
 from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, run_together
 from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import OBJECTIVES, Objective, Outcome, Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable
-
-Floats = NDArray[np.float64]
 
 WEIGHED: Final = OBJECTIVES[:5]
 """f1 to f5, weighed by the preferences of table 4.5."""

@@ -40,6 +40,7 @@ from gaitswarm.services.optimizer.jobs.preference import (
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
@@ -54,8 +55,6 @@ from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_grounds, check_worlds
 from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk
-
-Floats = NDArray[np.float64]
 
 
 class WalksSpec(Scenarios, Spec):

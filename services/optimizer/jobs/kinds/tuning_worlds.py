@@ -9,16 +9,14 @@ from functools import lru_cache
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from gaitswarm.services.optimizer.jobs.preference import Judgement, geometric_mean
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
 from gaitswarm.sim.worlds import DRAWN, PERTURBATIONS, sample_worlds
-
-Floats = NDArray[np.float64]
 
 Aggregate = Literal["mean", "quantile", "worst", "cvar"]
 

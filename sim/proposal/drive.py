@@ -36,6 +36,9 @@ _GUESSED_SPEED: Final = 20.0
 _ARMATURE: Final = 0.02
 """Rotor inertia at a joint, relative to a leg's share of the mass at the leg's length."""
 
+_STUCK: Final = 0.5
+"""Friction at full speed beyond which it is implausible, relative to the torque at standstill."""
+
 _SINKS: Final = 0.01
 """Deflection of soles when half the legs carry the robot, relative to its height."""
 
@@ -61,6 +64,8 @@ class DriveNumbers:
     speed: float  # without load at a DC motor's full voltage [rad/s]
     armature: float  # of the rotor at the joint [kg m2]
     note: str  # source of the numbers
+    damping: float = 0.0  # at the joint [N m s/rad]
+    friction: float = 0.0  # dry, at the joint [N m]
     believed: bool = False  # whether torque and speed are the URDF's
     listed: str | None = None  # name in the library of actuators
 
@@ -161,8 +166,23 @@ def _drive(joint: Joint, need: float, armature: float) -> DriveNumbers:
         + (f" (the URDF's {joint.effort:g} N m is not plausible)" if joint.effort else ""),
         "speed from its velocity" if fast else "speed guessed",
     ]
-    numbers = _short(torque), _short(speed), _short(armature)
-    return DriveNumbers(*numbers, "; ".join(sources), believed=given and fast)
+    rotor, damping, friction = joint.dynamics or (0.0, 0.0, 0.0)
+    if joint.dynamics:
+        sources.append("rotor inertia and friction from the MJCF")
+    if friction + damping * speed > _STUCK * torque:
+        sources.append(
+            f"without friction, as {friction:g} N m and {damping:g} N m s/rad are too large"
+        )
+        damping = friction = 0.0
+    return DriveNumbers(
+        torque=_short(torque),
+        speed=_short(speed),
+        armature=_short(rotor or armature),
+        note="; ".join(sources),
+        damping=_short(damping),
+        friction=_short(friction),
+        believed=given and fast,
+    )
 
 
 def propose_sole(
@@ -306,7 +326,8 @@ def _dc_motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     lines = [
         "",
         "# Each drive is a DC motor whose torque falls from standstill to its no-load speed at",
-        f"# {_VOLTAGE:g} V; rotor inertia is 2 % of a leg's share of the mass at the leg's length.",
+        f"# {_VOLTAGE:g} V; rotor inertia is 2 % of a leg's share of the mass at the leg's length,",
+        "# unless a note says otherwise.",
     ]
     for drive, name in drive_names(drives).items():
         constant = _VOLTAGE / drive.speed / _RATIO
@@ -318,13 +339,14 @@ def _dc_motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
             f"resistance = {resistance:.6g}       # ohm",
             "inductance = 1e-4                   # H",
             f"rotor_inertia = {drive.armature / _RATIO**2:.6g}    # kg m2",
-            "viscous_friction = 0.0              # N m s/rad",
+            f"viscous_friction = {drive.damping / _RATIO**2:.6g}    # N m s/rad",
             "",
             f"[gearheads.{name}]",
             f"ratio = {_RATIO}",
             f"nominal_torque = {drive.torque:.6g}    # N m",
             f"nominal_speed = {drive.speed * _RATIO:.6g}    # rad/s, motor side",
             f"efficiency = {_EFFICIENCY}          # guessed",
+            *_friction("coulomb_friction", drive.friction),
             "",
             f"[actuators.{name}]",
             f"motor = {quoted(name)}",
@@ -339,7 +361,7 @@ def _torque_actuators(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
         "# Each actuator has its full torque up to half its speed limit, and less above that.",
         f"# Guessed: the motor's voltage at the speed limit is {_VOLTAGE:g} V; its heat at the",
         "# torque limit is the largest power on a line between the two limits; rotor inertia is",
-        "# 2 % of a leg's share of the mass at the leg's length; there is no friction.",
+        "# 2 % of a leg's share of the mass at the leg's length, unless a note says otherwise.",
     ]
     for drive, name in drive_names(drives).items():
         constant = _VOLTAGE / drive.speed
@@ -355,8 +377,14 @@ def _torque_actuators(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
             f"torque_limit = {drive.torque:.6g}   # N m",
             f"speed_limit = {drive.speed:.6g}     # rad/s",
             f"knee_speed = {_KNEE * drive.speed:.6g}      # rad/s",
+            *_friction("viscous_friction", drive.damping),
+            *_friction("coulomb_friction", drive.friction),
         ]
     return lines
+
+
+def _friction(name: str, value: float) -> list[str]:
+    return [f"{name} = {value:.6g}"] if value else []
 
 
 _TORQUE_COMMAND: Final = (

@@ -89,6 +89,8 @@ def _file_of(mesh: Any) -> Path:
 _JOINT_KINDS: Final = {2: "prismatic", 3: "revolute"}
 """By MuJoCo's number; 0 is free, 1 a ball."""
 
+_SLIDES: Final = min(_JOINT_KINDS)
+
 _SHAPES: Final = {2: "sphere", 3: "capsule", 5: "cylinder", 6: "box"}
 """By MuJoCo's number."""
 
@@ -109,7 +111,7 @@ def _urdf_of(spec: Any, model: Any, notes: list[str]) -> str:
     robot = ET.Element("robot", name=spec.modelname or "robot")
     # By body: name of its link, and the link's frame, which is at the joint, in the body's.
     links: dict[int, tuple[str, Floats]] = {}
-    efforts = _efforts(model)
+    efforts, dynamics = _efforts(model), _dynamics(model, notes)
     for body in range(first, model.nbody):
         parent = int(model.body_parentid[body])
         if body != first and parent not in links:
@@ -124,7 +126,7 @@ def _urdf_of(spec: Any, model: Any, notes: list[str]) -> str:
                 shift, last = model.jnt_pos[joint], shift
                 place = place + _matrix(turn) @ (shift - last)
                 link = name if joint == joints[-1] else f"{name}_{joint}"
-                _add_joint(robot, model, joint, before, link, place, turn, efforts)
+                _add_joint(robot, model, joint, before, link, place, turn, efforts, dynamics)
                 if link != name:
                     ET.SubElement(robot, "link", name=link)
                 before, place, turn = link, np.zeros(3), _UPRIGHT
@@ -147,6 +149,7 @@ def _add_joint(
     place: Floats,
     turn: Floats,
     efforts: Floats,
+    dynamics: Floats,
 ) -> None:
     name = model.joint(number).name or f"{child}_joint"
     kind = _JOINT_KINDS.get(int(model.jnt_type[number]))
@@ -165,6 +168,10 @@ def _add_joint(
     limits = {} if kind == "continuous" else {"lower": f"{lower:.9g}", "upper": f"{upper:.9g}"}
     effort, speed = efforts[number], _SPEED if efforts[number] > 0.0 else 0.0
     ET.SubElement(joint, "limit", limits | {"effort": f"{effort:.9g}", "velocity": f"{speed:g}"})
+    if dynamics[number].any():
+        names = ("armature", "damping", "friction")
+        values = (f"{value:.9g}" for value in dynamics[number].tolist())
+        ET.SubElement(joint, "dynamics", dict(zip(names, values, strict=True)))
 
 
 def _efforts(model: Any) -> Floats:
@@ -184,6 +191,36 @@ def _efforts(model: Any) -> Floats:
     ranges = np.abs(model.jnt_actfrcrange).max(axis=1)
     capped = np.where(efforts > 0.0, np.minimum(efforts, ranges), ranges)
     return np.where(model.jnt_actfrclimited.astype(bool), capped, efforts)
+
+
+def _dynamics(model: Any, notes: list[str]) -> Floats:
+    """Armature [kg m2], damping [N m s/rad] and dry friction [N m] of joints, (n_joints, 3)."""
+    of_axes = np.stack([model.dof_armature, model.dof_damping, model.dof_frictionloss], axis=1)
+    dynamics = np.where(model.jnt_type[:, None] >= _SLIDES, of_axes[model.jnt_dofadr], 0.0)
+    gains = []
+    for k in range(model.nu):
+        if model.actuator_trntype[k] > 1:
+            continue
+        joint, gear = model.actuator_trnid[k, 0], float(model.actuator_gear[k, 0])
+        _, stiffness, damping = -model.actuator_biasprm[k, :3] * gear**2
+        if stiffness > 0.0:
+            # Without a derivative gain of its own, a position loop has the joint's damping.
+            if damping == 0.0:
+                damping, dynamics[joint, 1] = dynamics[joint, 1], 0.0
+            gains.append((float(stiffness), float(damping)))
+        rotor = model.actuator_armature[k], model.actuator_damping[k]
+        dynamics[joint, :2] += gear**2 * np.array(rotor)
+    if gains:
+        (least, slow), (most, fast) = np.min(gains, axis=0), np.max(gains, axis=0)
+        notes.append(
+            f"position loops of the MJCF have {_span(least, most)} N m/rad and"
+            f" {_span(slow, fast)} N m s/rad; controllers here have gains of their own"
+        )
+    return dynamics
+
+
+def _span(least: float, most: float) -> str:
+    return f"{least:.3g}" if least == most else f"{least:.3g} to {most:.3g}"
 
 
 def _add_link(

@@ -161,6 +161,9 @@ class Joint:
     effort: float  # largest torque [N m]; 0 where the file gives none
     velocity: float  # largest rate [rad/s]; 0 where the file gives none
     follows: str | None = None  # joint that it mimics
+    # armature [kg m2], damping [N m s/rad] and friction [N m] of URDFs from MJCF; those that others
+    # give are seldom more than placeholders
+    dynamics: tuple[float, float, float] | None = None
 
     @property
     def fixed(self) -> bool:
@@ -190,6 +193,11 @@ def joint_of(element: ET.Element) -> Joint:
         0.0 if limit is None else float(numbers_of(limit, attribute, whose, "0", math.inf)[0])
         for attribute in ("effort", "velocity")
     )
+    dynamics = element.find("dynamics[@armature]")
+    armature, damping, friction = (
+        0.0 if dynamics is None else float(numbers_of(dynamics, attribute, whose, "0")[0])
+        for attribute in ("armature", "damping", "friction")
+    )
     return Joint(
         name=name,
         kind=kind,
@@ -201,6 +209,7 @@ def joint_of(element: ET.Element) -> Joint:
         effort=effort,
         velocity=velocity,
         follows=None if mimic is None else mimic.get("joint", ""),
+        dynamics=None if dynamics is None else (armature, damping, friction),
     )
 
 

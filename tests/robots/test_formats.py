@@ -17,6 +17,7 @@ from gaitswarm.sim.proposal.document import propose_robot, walking_proposal
 from gaitswarm.sim.proposal.formats import as_urdf, format_of
 from gaitswarm.sim.proposal.from_xacro import expanded
 from gaitswarm.sim.robot import parse_robot
+from gaitswarm.sim.robot.actuators import ActuatorKind
 from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.robots.test_proposal import INERTIAL, dog
 
@@ -220,6 +221,46 @@ def test_mjcf_gives_limits_torques_and_feet() -> None:
     robot = parse_robot(made.toml, made.urdf)
     assert robot.description.contact.sole == pytest.approx(0.02)
     assert [leg.name for leg in robot.description.legs] == list(LEGS)
+
+
+def with_dynamics(roll: str, pitch: str, actuators: str) -> str:
+    """The robot with attributes of the joints at its hips, and of their actuators."""
+    return (
+        MJCF.replace('range="-45 45"', f'range="-45 45" {roll}')
+        .replace('ref="5"', f'ref="5" {pitch}')
+        .replace("<position", f"<position {actuators}")
+        .replace("<motor", f"<motor {actuators}")
+    )
+
+
+@pytest.mark.parametrize("kind", ["torque", "dc"])
+def test_rotors_and_friction_of_mjcf_are_those_of_the_actuators(kind: ActuatorKind) -> None:
+    joint = 'armature="0.01" frictionloss="0.3"'
+    urdf, notes = as_urdf(with_dynamics(f'{joint} damping="2"', f'{joint} damping="0.1"', ""))
+    # The damping of a joint with a position loop is the loop's.
+    assert any("50 N m/rad and 2 N m s/rad" in note for note in notes)
+    made = walking_proposal(urdf, "cat", kind)
+    assert any("rotor inertia and friction from the MJCF" in note for note in made.guesses)
+    actuators = parse_robot(made.toml, made.urdf).actuators()
+    np.testing.assert_allclose(actuators.armature.reshape(4, 3)[:, :2], 0.01, rtol=1e-5)
+    np.testing.assert_allclose(actuators.motor_friction.reshape(4, 3), [[0, 0.1, 0]] * 4, rtol=1e-5)
+    np.testing.assert_allclose(actuators.coulomb_friction.reshape(4, 3), [[0.3, 0.3, 0]] * 4)
+
+
+def test_rotors_of_actuators_count_through_their_gear() -> None:
+    text = with_dynamics("", 'armature="0.01" damping="0.1"', 'armature="0.002" damping="0.03"')
+    joints = {joint.name: joint for joint in parse_urdf(as_urdf(text)[0]).joints}
+    assert joints["FL_roll"].dynamics == pytest.approx((0.002, 0.03, 0.0))
+    assert joints["FL_pitch"].dynamics == pytest.approx((0.01 + 9 * 0.002, 0.1 + 9 * 0.03, 0.0))
+    assert joints["FL_knee"].dynamics is None
+
+
+def test_friction_that_would_hold_a_joint_is_left_out() -> None:
+    urdf, _ = as_urdf(with_dynamics("", 'frictionloss="1" damping="5"', ""))
+    made = walking_proposal(urdf, "cat", "torque")
+    assert any("1 N m and 5 N m s/rad are too large" in note for note in made.guesses)
+    actuators = parse_robot(made.toml, made.urdf).actuators()
+    assert not (actuators.motor_friction.any() or actuators.coulomb_friction.any())
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ ENGINE: Final = "engine"
 ENGINES: Final[Mapping[EngineName, str]] = MappingProxyType(
     {
         "mujoco": "MuJoCo's rigid bodies and integrator, under our laws of contact",
-        "mujoco-contacts": "MuJoCo's rigid bodies, integrator and contacts: spheres on a plane,"
+        "mujoco-contacts": "MuJoCo's rigid bodies, integrator and contacts: spheres on the ground,"
         " as stiff, damped and rough as our soles",
     }
 )

@@ -18,7 +18,6 @@ import numpy as np
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.control_tick import (
     InnerLoop,
     Past,
@@ -101,8 +100,6 @@ class MujocoKernel:
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute the walks one after the other."""
         for setup in setups:
-            if setup.terrain is not None and self._soles != "none":
-                raise SimulationInputError("MuJoCo's contacts are on flat ground only")
             check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(
                 joints=self._robot.n_joints,
@@ -314,6 +311,9 @@ class _Stepper:
     def _derive(self) -> None:
         """mj_step1 without its checks, which would write to a file of the user."""
         m, d = self._m, self._d
+        if self._terrain is not None and not self._pushed:
+            mujoco.mj_kinematics(m, d)
+            self._terrain.lay_planes(d.site_xpos)
         mujoco.mj_fwdPosition(m, d)
         mujoco.mj_sensorPos(m, d)
         mujoco.mj_fwdVelocity(m, d)
@@ -354,6 +354,13 @@ class _Terrain:
             axes[foot] = ahead, np.cross(normal, ahead), normal
         return heights, axes
 
+    def lay_planes(self, places: Floats) -> None:
+        """Lay each foot's plane along the ground below it."""
+        heights, axes = self.below(places)
+        self._d.mocap_pos[:] = np.column_stack([places[:, :2], heights])
+        for turn, rows in zip(self._d.mocap_quat, axes, strict=True):
+            mujoco.mju_mat2Quat(turn, rows.T.ravel())
+
 
 _DOWN: Final = np.array([0.0, 0.0, -1.0])
 
@@ -367,13 +374,13 @@ def _model(robot: Robot, setup: WalkSetup, soles: Soles) -> mujoco.MjModel:
     if setup.terrain is not None:
         reach = reach_of(setup.ticks * CONTROL_PERIOD)
         surroundings = replace(surroundings, ground=setup.terrain, reach=reach)
-    rig = Rig()
+    rig = Rig(tangent_planes=setup.terrain is not None and soles != "none")
     if soles != "none":
         feet = Feet(even_drags(robot, surroundings), points=soles == "points")
         rig = with_contacts(robot, surroundings, rig, feet)
     model = mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
     if surroundings.ground is not None:
-        model.hfield_data[:] = height_field(surroundings, soles).heights.ravel()
+        model.hfield_data[:] = height_field(surroundings, "none").heights.ravel()
     return model
 
 

@@ -117,6 +117,8 @@ class Rig:
     contacts: Sequence[Mapping[str, str]] = ()
     # MuJoCo's impratio: stiffness [1] of a contact's tangential constraint over the normal one
     friction_impedance: float = 1.0
+    # whether each foot touches a plane of its own, to be laid along uneven ground below it
+    tangent_planes: bool = False
     # whether joints have actuators that turn a motor's voltage [V] into its torque, quasi-static,
     # friction included (torque-controlled joints: that take the torque [N m]); else torques are
     # external
@@ -165,7 +167,7 @@ def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
             _add_sole(foot, robot, leg, repr(radius) if rig.soles == "spheres" else _POINT)
     feet = [leg.foot for leg in robot.description.legs]
     if rig.soles != "none":
-        _add_pairs(root, feet, surroundings.contacts, rig.contacts)
+        _add_pairs(root, world, feet, surroundings.contacts, rig)
     _add_sensors(root, feet)
     if rig.voltage_motors:
         _add_motors(root, robot)
@@ -180,7 +182,7 @@ def _add_height_field(
     root: ET.Element, world: ET.Element, surroundings: Surroundings, rig: Rig
 ) -> None:
     """Add the ground; with visible shapes its heights are in the text, else they are to be set."""
-    field = height_field(surroundings, rig.soles)
+    field = height_field(surroundings, "none" if rig.tangent_planes else rig.soles)
     rows, columns = field.heights.shape
     data = {"elevation": " ".join(f"{x:.4g}" for x in field.heights.ravel())} if rig.looks else {}
     ET.SubElement(
@@ -300,19 +302,26 @@ def _add_shapes(body: ET.Element, shapes: Sequence[Shape]) -> None:
 
 def _add_pairs(
     root: ET.Element,
+    world: ET.Element,
     feet: Sequence[str],
     contacts: Sequence[Contact],
-    attributes: Sequence[Mapping[str, str]],
+    rig: Rig,
 ) -> None:
     element = ET.SubElement(root, "contact")
     for number, (foot, contact) in enumerate(zip(feet, contacts, strict=True)):
+        ground = "ground"
+        if rig.tangent_planes:
+            ground = f"{foot}_ground"
+            plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": "0"}
+            body = ET.SubElement(world, "body", name=ground, mocap="true")
+            ET.SubElement(body, "geom", {"name": ground} | plane)
         pair = {
             "geom1": f"{foot}_sole",
-            "geom2": "ground",
+            "geom2": ground,
             "condim": "3",
             "friction": _numbers([contact.friction] * 2 + [0.0] * 3),
         }
-        ET.SubElement(element, "pair", pair | dict(attributes[number] if attributes else {}))
+        ET.SubElement(element, "pair", pair | dict(rig.contacts[number] if rig.contacts else {}))
 
 
 def _add_sensors(root: ET.Element, sites: Sequence[str]) -> None:

@@ -226,3 +226,18 @@ def test_mujocos_height_field_is_the_kernels_uneven_ground() -> None:
     apart = np.abs(mujocos[:5] / ours[:5] - 1.0).max()
     assert apart < 0.1
     assert apart < 0.5 * np.abs(ours[:5] / flat[:5] - 1.0).max()
+
+
+def test_mujocos_own_contacts_follow_uneven_ground() -> None:
+    """On ground that is all but flat as on a plane; on rubble as near to the kernel as there."""
+    controller, design, _ = DRIVES["stiff PI"]
+    found = {}
+    for amplitude in (0.0, 1e-6, 0.01):
+        terrain = {"kind": "rough", "amplitude": amplitude} if amplitude else {"kind": "plane"}
+        scenario = one_cycle(NORMAL_FAST).model_dump() | {"cycle_time": 0.7, "terrain": terrain}
+        walked = Scenario.model_validate(scenario)
+        ours, _ = our_walk("stiff PI", walked)
+        theirs, _ = walk_in_mujoco(PLAIN, walked, controller, design, soles="spheres")
+        found[amplitude] = theirs[:5] / ours[:5]
+    np.testing.assert_allclose(found[1e-6], found[0.0], rtol=1e-3)
+    assert np.abs(found[0.01] - 1.0).max() < np.abs(found[0.0] - 1.0).max() + 0.1

@@ -335,12 +335,6 @@ class CertificateSpec(WalksSpec):
         for held_out in self.held_out or ():
             if held_out not in self.case_names:
                 raise ValueError(f"held_out: {held_out!r} is not among the scenarios")
-        uneven = [s.name for s in self.resolved_scenarios() if s.terrain.kind != "plane"]
-        if uneven and "mujoco-contacts" in self.engines:
-            raise ValueError(
-                f"engines: mujoco-contacts has flat ground only, and {uneven[0]!r} has not; use"
-                " mujoco"
-            )
         check_design(self.controller, self.design)
         self.design_space()
         return self

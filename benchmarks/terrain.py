@@ -40,7 +40,7 @@ GROUNDS: Final[Mapping[str, dict[str, Any]]] = {
 def constrained_optimum() -> dict[str, Any]:
     limits = {"quantity": "*", "relative_to": "published:A", "max": 1.0}
     spec = gaitswarm.JobSpec.model_validate(
-        {"preference": "A", "particles": 25, "iterations": 25, "seed": 1, "constraints": [limits]}
+        {"preference": "A", "iterations": 25, "seed": 1, "constraints": [limits]}
     )
     with tempfile.TemporaryDirectory() as folder:
         database = str(Path(folder, "jobs.db"))

@@ -181,6 +181,22 @@ def test_a_killed_search_for_preferences_equals_one_never_killed(
     assert walked(store, killed) == walked(store, whole)
 
 
+def test_a_job_killed_on_rough_ground_equals_one_never_killed(
+    store: Store, url: str, evaluator: Evaluator
+) -> None:
+    rough = SHORT_WALK | {"terrain": {"kind": "rough", "amplitude": 0.02}}
+    worlds = {"count": 3, "ranges": ["world_seed"], "aggregate": "cvar"}
+    changes = {"scenarios": [rough], "worlds": worlds, "iterations": 6}
+    spec = JobSpec.model_validate(SPEC.model_dump() | changes).with_gait_searched()
+    whole, killed = run_alone(store, evaluator, spec), queue(store, spec)
+    life = Life(url, killed)
+    life.wait_for_a_commit()
+    life.kill()
+    assert 1 <= store.job(killed).progress.iterations < store.job(whole).progress.iterations
+    assert run_embedded(store, evaluator, killed).state is JobState.SUCCEEDED
+    assert walked(store, killed) == walked(store, whole)
+
+
 @pytest.mark.thorough(
     "test_resumed_job_equals_one_never_killed, for all methods",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,13 @@ from pydantic import ValidationError
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.compiler.compilation import X86, Target, host_architecture, target
 from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.native import load_kernel
 from gaitswarm.sim.kernel.parameters import pack_parameters
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
 from gaitswarm.sim.robot.shapes import body_corners
@@ -30,6 +34,11 @@ BRIEF = {"cycle_time": 0.5}
 
 def on(terrain: dict[str, Any], **changes: object) -> Scenario:
     return short_walk(terrain=terrain, **changes)
+
+
+def rough_worlds() -> WorldWalk:
+    names = ("roughness", "world_seed")
+    return WorldWalk(DEFAULT_ROBOT, "fuzzy-pi", tuple(PUBLISHED_A.items()), short_walk(), names)
 
 
 def level(height: float) -> dict[str, Any]:
@@ -112,12 +121,30 @@ def test_the_compiled_kernel_walks_as_the_reference_does(terrain: dict[str, Any]
 
 
 def test_a_walk_on_rough_ground_has_the_same_bits_in_any_company() -> None:
-    names, worlds = ("roughness", "world_seed"), np.array([[0.01, k] for k in range(11)])
-    case = WorldWalk(DEFAULT_ROBOT, "fuzzy-pi", tuple(PUBLISHED_A.items()), short_walk(), names)
+    case, worlds = rough_worlds(), np.array([[0.01, k] for k in range(11)])
     together = case.run(worlds)
     for k in (0, 3, 10):
         assert case.run(worlds[k : k + 1]).objectives.tobytes() == together.objectives[k].tobytes()
     assert len(set(together.objectives[:, 0].tolist())) == len(worlds)
+
+
+@pytest.mark.variants("Target(lanes=4,*double")
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("narrower", [Target(4, "x86-64-v3"), Target(2)], ids=str)
+def test_rough_ground_has_the_same_bits_at_every_vector_width(
+    narrower: Target, precision: Precision
+) -> None:
+    if host_architecture() != X86 or target().lanes < narrower.lanes:
+        narrower = target()
+    robot = load_robot(DEFAULT_ROBOT)
+    narrow = load_kernel(robot, precision, compile_for=narrower, uneven=True)
+    assert narrow is not None
+    case = replace(rough_worlds(), precision=precision)
+    worlds = np.array([[0.02, k] for k in range(5)])
+    wide, thin = case.simulate(worlds), case.simulate(worlds, kernel=narrow)
+    assert wide.outcome.objectives.tobytes() == thin.outcome.objectives.tobytes()
+    assert wide.measurements.array().tobytes() == thin.measurements.array().tobytes()
 
 
 def test_single_precision_is_close_to_double() -> None:

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from gaitswarm.replay import ReplayRequest, run_replay
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
 from gaitswarm.sim.compiler.compilation import X86, Target, host_architecture, target
@@ -214,6 +216,19 @@ def test_jobs_do_not_roughen_stairs() -> None:
     spec = JobSpec.model_validate({"controller": "pi", "scenarios": [stairs], "worlds": worlds})
     with pytest.raises(InvalidRequest, match=r"roughness: .* kind stairs"):
         spec.check_can_be_simulated()
+
+
+def test_a_simulation_or_replay_in_a_world_does_not_roughen_stairs() -> None:
+    asked = {"controller": "fuzzy-pi", "design": PUBLISHED_A, "world": {"roughness": 0.01}}
+    scenario = on(STAIRS).model_dump()
+    several = SimulationRequest.model_validate(asked | {"scenarios": [scenario]})
+    single = ReplayRequest.model_validate(asked | {"scenario": scenario})
+    with pytest.raises(InvalidRequest, match=r"roughness: .* kind stairs") as refused:
+        several.check_walks()
+    assert refused.value.field == "world"
+    with pytest.raises(InvalidRequest, match=r"roughness: .* kind stairs") as refused:
+        run_replay(single)
+    assert refused.value.field == "world"
 
 
 @pytest.mark.parametrize(

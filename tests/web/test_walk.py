@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import httpx2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.examples.servers import ServerProcess, unframed
 from tests.web.pixels import colourful, other_than, painted
@@ -109,6 +111,31 @@ def test_a_replay_can_be_scrubbed_stepped_and_played(
     page.get_by_label("Speed").select_option("4")
     expect(player(page)).to_have_attribute("data-playing", "false")
     expect_frame(page, recording.header["frames"] - 1, recording)
+
+
+def on_rough_ground(route: Route, *, with_heights: bool) -> None:
+    """Answer the page's request for a replay by the same walk in a rough world."""
+    asked = json.loads(route.request.post_data or "")
+    world = {"roughness": 0.02, "world_seed": 7}
+    header, numbers = unframed(route.fetch(post_data=asked | {"world": world}).body())
+    assert np.ptp(header["ground"]["heights"]["z"]) > 0.01
+    if not with_heights:
+        header["ground"]["heights"] = None
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    route.fulfill(body=struct.pack("<I", len(text)) + text + numbers.tobytes())
+
+
+def test_uneven_ground_is_drawn(server: ServerProcess, visit: Callable[..., Visit]) -> None:
+    pictures = []
+    for with_heights in (True, False):
+        visited = visit(server.url)
+        visited.page.route("**/v1/replays", partial(on_rough_ground, with_heights=with_heights))
+        page = visited.go("/walk?published=A&scenario=normal-fast")
+        pictures.append(painted(player(page).locator("canvas"), colourful(200)))
+        visited.page.unroute("**/v1/replays")
+    uneven, flat = pictures
+    assert (uneven != flat).any(axis=2).mean() > 0.1
 
 
 WITHOUT_MP4 = """() => {

@@ -22,7 +22,7 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, Scenarios
 from gaitswarm.sim.simulate import Simulation, check_drives, check_reach, simulate
 from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.sim.worlds import MeasuredPerturbedWalk, check_worlds
+from gaitswarm.sim.worlds import MeasuredPerturbedWalk, check_worlds, ground_of
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 
@@ -117,6 +117,12 @@ class WorldRequest(DesignRequest):
         except SimulationInputError as error:
             raise ValueError(f"world.{error}") from error
         return self
+
+    def check_reach(self, scenario: Scenario, *, field: str) -> None:
+        """Check also that the scenario's ground takes the world's roughness."""
+        super().check_reach(scenario, field=field)
+        with simulation_errors("world"):
+            ground_of(scenario, self.world.get("roughness", 0.0))
 
     def perturbed_walk(
         self, scenario: Scenario, precision: Precision = "double"

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.analysis.history import no_rows
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.arrays import Floats
@@ -127,7 +128,7 @@ class EvaluationTable(Table):
             pieces: The evaluations by pieces, in order.
         """
         # Without any piece the columns still exist.
-        return cls(spec, joined([_no_rows(spec), *pieces]))
+        return cls(spec, joined([no_rows(spec), *pieces]))
 
     @classmethod
     def from_parquet(cls, spec: Spec, content: bytes) -> Self:
@@ -229,7 +230,7 @@ def encoded_table(
     import pyarrow.csv as pc
     import pyarrow.parquet as pq
 
-    empty = {name: _arrow(column) for name, column in _flat(spec, _no_rows(spec)).items()}
+    empty = {name: _arrow(column) for name, column in _flat(spec, no_rows(spec)).items()}
     schema = pa.schema([(name, array.type) for name, array in empty.items()])
     # Names of columns and statuses have no character that would need quotes.
     options = pc.WriteOptions(quoting_style="none", quoting_header="none", eol="\r\n")
@@ -273,18 +274,6 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
 
 _LABELS: Final = np.array([status.label for status in sorted(Status)])
 """Labels of statuses, by number."""
-
-
-def _no_rows(spec: Spec) -> EvaluationColumns:
-    cases = len(spec.case_names)
-    return EvaluationColumns(
-        iteration=np.empty(0, dtype=np.int64),
-        particle=np.empty(0, dtype=np.int64),
-        designs=np.empty((0, len(spec.design_space().names))),
-        objectives=np.empty((0, cases, len(spec.columns))),
-        statuses=np.empty((0, cases), dtype=np.uint8),
-        fitness=np.empty(0),
-    )
 
 
 def _finite(column: Floats) -> Floats:

@@ -16,6 +16,7 @@ from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 
 if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.services.optimizer.store import Store
 
 PIECE: Final = 2000
@@ -70,13 +71,13 @@ class HistoryCache:
     def columns(self, job: Job) -> EvaluationColumns:
         """Return the evaluations of a job's committed iterations, read-only."""
         with self._reading:
-            history = self._histories.pop(job.id, None) or _empty_columns(job)
+            history = self._histories.pop(job.id, None) or no_rows(job.spec)
             first = int(history.iteration[-1]) + 1 if len(history) else 0
             if first < job.progress.iterations:
                 nbytes = job.progress.evaluations * _row_bytes(history)
                 if nbytes + len(history) * _row_bytes(history) > self._max_bytes:
                     # Without room for a larger copy, all is read again.
-                    history, first = _empty_columns(job), 0
+                    history, first = no_rows(job.spec), 0
                 self._make_room(job, nbytes)
                 history = self._read(job, history, first)
             self._histories[job.id] = history
@@ -124,8 +125,8 @@ class HistoryCache:
             self._changed.notify_all()
 
 
-def _empty_columns(job: Job) -> EvaluationColumns:
-    spec = job.spec
+def no_rows(spec: Spec) -> EvaluationColumns:
+    """Return the columns of no evaluations."""
     cases = len(spec.case_names)
     return EvaluationColumns(
         iteration=np.empty(0, dtype=np.int64),

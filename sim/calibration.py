@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
@@ -17,7 +17,7 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, control_law
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.input import check_distinct
+from gaitswarm.sim.input import Data, check_distinct
 from gaitswarm.sim.kernel.walk import Precision, Walking, WalkRequest, WalkSetup, walk_together
 from gaitswarm.sim.outcome import N_OBJECTIVES, RESULTS, Objective, Outcome, Status
 from gaitswarm.sim.robot import Robot, RobotSource, load_robot
@@ -87,10 +87,8 @@ QUANTITIES: Final[dict[QuantityName, Quantity]] = {
 }
 
 
-class TargetWalk(BaseModel):
+class TargetWalk(Data):
     """A measured or published walk: its drive and its scenarios."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     name: WalkName
     controller: ControllerName = Field(description="Controller that drove it.")
@@ -123,10 +121,8 @@ class TargetWalk(BaseModel):
         return tuple(sorted(design_numbers(self.controller, self.design).items()))
 
 
-class Target(BaseModel):
+class Target(Data):
     """One result of a walk, and the tolerance of its simulation."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     walk: WalkName
     quantity: QuantityName = Field(description="What was measured.", examples=["energy"])

@@ -6,18 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict
-
 from gaitswarm.sim.case import Case, Walk
 from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input import Data
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import MISSING, Plugin, Registry, check_is, check_name, version_of
 
 
-class CaseSettings(BaseModel):
+class CaseSettings(Data):
     """Base class of cases' settings."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     name: str
 

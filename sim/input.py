@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, Discriminator, Tag
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Tag
 
 from gaitswarm.sim.near_names import instead_of, nearest
 
@@ -19,6 +19,12 @@ OWN: Final = "<own>"
 
 _KEY: Final = "[key]"
 """Appended by pydantic if the key of a dictionary is wrong, not its value."""
+
+
+class Data(BaseModel):
+    """Immutable data without unknown fields or infinities."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def _printable(text: str) -> str:

@@ -6,22 +6,21 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from gaitswarm.sim.input import Data
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 LARGEST_ANGLE: Final = 0.5
 """Largest standard deviation [rad]."""
 
 
-class LinkNoise(BaseModel):
+class LinkNoise(Data):
     """White noise between gearhead and link of all links of one kind, new at every control tick.
 
     An angle displaces the link against its gearhead, so the robot needs elastic shafts
     (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` adds them.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     link: Literal[1, 2, 3] = Field(description="Links disturbed: 1 coxa, 2 femur, 3 tibia.")
     deviation: float = Field(

@@ -11,7 +11,6 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     Tag,
     TypeAdapter,
@@ -20,7 +19,7 @@ from pydantic import (
 )
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import NAME, OWN, alternatives, check_distinct, message_of
+from gaitswarm.sim.input import NAME, OWN, Data, alternatives, check_distinct, message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.terrain import PLANE, Terrain
 from gaitswarm.sim.variables import VariableName, split_name
@@ -78,13 +77,11 @@ Phase = Annotated[float, Field(ge=0.0, lt=1.0)]
 LegName = Annotated[str, Field(min_length=1, max_length=60)]
 
 
-class Scenario(BaseModel):
+class Scenario(Data):
     """A walk to be simulated: gait, posture, load and ground.
 
     docs/model.md explains the defaults of fields that are not in table 4.2.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: ScenarioName
     cycle_time: float = Field(

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import NAME, alternatives
+from gaitswarm.sim.input import NAME, Data, alternatives
 from gaitswarm.sim.robot.actuators import AnyActuator
 from gaitswarm.sim.robot.bounds import (
     DEEPEST,
@@ -97,10 +97,8 @@ def shipped_robot(name: str) -> Robot:
 Degrees = tuple[float, float, float]
 
 
-class RobotVariant(BaseModel):
+class RobotVariant(Data):
     """A shipped robot, modelled in more detail than by default."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: RobotName = Field(default=DEFAULT_ROBOT, description="Robot to start from.")
     contact_law: ContactLaw | None = Field(

@@ -14,9 +14,7 @@ from typing import Annotated, Final, NamedTuple, Self
 
 import numpy as np
 from pydantic import (
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     TypeAdapter,
     ValidationError,
@@ -25,7 +23,7 @@ from pydantic import (
 )
 
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.input import message_of
+from gaitswarm.sim.input import Data, message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Objective
 from gaitswarm.sim.variables import VariableName, VariableValue
@@ -65,10 +63,8 @@ def reference_choice(text: str) -> ReferenceChoice:
         raise ValueError(f"is no design: {message_of(error.errors()[0])}") from error
 
 
-class Constraint(BaseModel):
+class Constraint(Data):
     """A limit on a quantity, in a scenario or in all."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     quantity: str = Field(
         min_length=1,

@@ -9,10 +9,10 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.input import NAME, OWN, alternatives
+from gaitswarm.sim.input import NAME, OWN, Data, alternatives
 from gaitswarm.sim.outcome import Outcome, Status
 
 _PIECE: Final = 4096
@@ -79,15 +79,13 @@ Bias = Annotated[float, Field(ge=0.0, le=1e6)]
 Exponent = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
-class Preference(BaseModel):
+class Preference(Data):
     """Biases b and exponents e of the objectives, in the order f1..f6 of table 4.1.
 
     A scenario's utility, minimized, is prod_m (b_m + f_m) ** e_m: with five entries the
     bias-weighted product of chapter 4 (eq. 4.1), with six that of chapter 3 (eq. 3.8). The signed
     height loss f6 enters by its absolute value, as in eq. 3.1: rising is no better than sinking.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     bias: tuple[Bias, ...] = Field(
         min_length=5,

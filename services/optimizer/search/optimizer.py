@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
+from gaitswarm.sim.input import Data
 
 
-class SearchSettings(BaseModel):
+class SearchSettings(Data):
     """Settings that every method has."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     name: str
     particles: int = Field(

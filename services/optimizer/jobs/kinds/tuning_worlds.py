@@ -9,11 +9,11 @@ from functools import lru_cache
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from gaitswarm.services.optimizer.jobs.preference import Judgement, geometric_mean
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.input import message_of
+from gaitswarm.sim.input import Data, message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
 from gaitswarm.sim.worlds import DRAWN, PERTURBATIONS, sample_worlds
@@ -53,10 +53,8 @@ _EDGE: Final = 1e-9
 """Tolerance in worlds: a share this close to an integer counts as that integer."""
 
 
-class TuningWorlds(BaseModel):
+class TuningWorlds(Data):
     """A set of worlds, shared by all designs and scenarios: common random numbers."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     count: int = Field(
         default=8, ge=1, le=100, description="Number of worlds; every design is simulated in each."

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.meshes import urdf_digest
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.designs import WorldRequest
 from gaitswarm.services.optimizer.views import StatusName, View, finite, framed
@@ -21,6 +20,7 @@ from gaitswarm.sim.replay import replay as replayed
 from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.actuators import TorqueActuator
 from gaitswarm.sim.robot.description import RobotDescription
+from gaitswarm.sim.robot.meshes import urdf_digest
 from gaitswarm.sim.robot.shapes import VisibleLink
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.sim.worlds import ground_of

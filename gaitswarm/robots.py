@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.meshes import Packages, copy_meshes, found_mesh, mesh_places, package_places
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
@@ -43,6 +42,13 @@ from gaitswarm.sim.robot.bounds import (
 )
 from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.meshes import (
+    Packages,
+    copy_meshes,
+    found_mesh,
+    mesh_places,
+    package_places,
+)
 from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, leg_points
 from gaitswarm.sim.robot.shapes import mesh_bounds
 from gaitswarm.sim.robot.urdf import unphysical

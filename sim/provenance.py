@@ -25,6 +25,7 @@ _NOT_IN_A_CASE: Final = (
     "proposal",
     "provenance.py",
     "replay.py",
+    "robot/meshes.py",
     "validation.py",
 )
 """Modules and packages of `sim` that no case uses."""

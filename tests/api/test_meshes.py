@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from gaitswarm import meshes
-from gaitswarm.meshes import urdf_digest
 from gaitswarm.replay import ReplayRequest, run_replay
+from gaitswarm.sim.robot import meshes
+from gaitswarm.sim.robot.meshes import urdf_digest
 from tests.examples.commands import run_command
 from tests.examples.meshes import tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm import meshes
 from gaitswarm.cli.main import run
-from gaitswarm.meshes import copy_meshes, mesh_content, own_place, served_meshes, urdf_digest
+from gaitswarm.meshes import mesh_content
+from gaitswarm.sim.robot import meshes
+from gaitswarm.sim.robot.meshes import copy_meshes, own_place, served_meshes, urdf_digest
 from tests.robots.test_proposal import dog
 
 

@@ -44,10 +44,11 @@ from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.firmware.folder import parsed_table_bits
+from gaitswarm.sim.gait.setpoints import trajectory_files
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.simulation import SimulationView, run_robustness, run_simulation
-from gaitswarm.trajectories import TrajectoriesRequest, trajectory_files
+from gaitswarm.trajectories import TrajectoriesRequest
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,

@@ -389,10 +389,7 @@ def run_simulation(request: SimulationRequest) -> SimulationView:
 
 
 def _simulated(
-    request: SimulationRequest,
-    designs: Floats,
-    *,
-    cpus: int | None = None,
+    request: SimulationRequest, designs: Floats, *, cpus: int | None = None
 ) -> SimulationResult:
     """Simulate designs with the variables of the request's, many of them in threads."""
     scenarios, variables = request.resolved_scenarios(), tuple(request.design)

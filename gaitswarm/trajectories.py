@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.designs import ScenariosRequest
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers import ControllerName
-from gaitswarm.sim.gait.setpoints import Setpoints, csv_text, joint_trajectory_yaml, setpoints
+from gaitswarm.sim.gait.setpoints import Setpoints, setpoints, trajectory_files
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
@@ -43,17 +43,6 @@ class TrajectoriesRequest(ScenariosRequest):
             }
 
 
-def trajectory_files(points: Mapping[str, Setpoints]) -> dict[str, bytes]:
-    """The files of all scenarios by name."""
-    files = {}
-    for name, of in points.items():
-        parts = {"start": of.start, "cycle": of.cycle, "stop": of.stop}
-        for part, rows in parts.items():
-            files[f"{name}-{part}.csv"] = csv_text(of.joints, of.step, rows).encode()
-        files[f"{name}.yaml"] = joint_trajectory_yaml(of).encode()
-    return files
-
-
 class ScenarioTrajectoryView(View):
     """Desired angles of a scenario."""
 
@@ -78,7 +67,7 @@ def _scenario_view(name: str, points: Setpoints) -> ScenarioTrajectoryView:
     return ScenarioTrajectoryView(
         scenario=name,
         step=points.step,
-        rows={part: len(getattr(points, part)) for part in ("start", "cycle", "stop")},
+        rows={part: len(rows) for part, rows in points.parts.items()},
         fastest_joint=points.joints[speeds.argmax()],
         largest_speed=float(speeds.max()),
     )

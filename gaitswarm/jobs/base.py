@@ -433,9 +433,7 @@ class Jobs(ABC):
         body="ExtensionRequest",
     )
     def extend(
-        self,
-        job_id: str,
-        iterations: Annotated[int, Field(ge=1, le=LARGEST_BUDGET, examples=[50])],
+        self, job_id: str, iterations: Annotated[int, Field(ge=1, le=LARGEST_BUDGET, examples=[50])]
     ) -> JobView:
         """Change the budget of a job; one that has succeeded is queued and continues.
 
@@ -774,11 +772,7 @@ class Jobs(ABC):
         body="types.FrontRequest",
     )
     def front(
-        self,
-        job_id: str,
-        *,
-        constraints: Sequence[ConstraintInput] | None = None,
-        most: int = 1000,
+        self, job_id: str, *, constraints: Sequence[ConstraintInput] | None = None, most: int = 1000
     ) -> types.FrontView:
         """Find the Pareto front of a job over f1 to f5, from stored objectives.
 

@@ -170,10 +170,7 @@ class DatabaseJobs(Jobs):
 
         check_workers(evaluator, cpus)
         stop = stop or threading.Event()
-        if isinstance(job, Spec):
-            begun = self._begun(job, reuse=reuse)
-        else:
-            begun = job
+        begun = self._begun(job, reuse=reuse) if isinstance(job, Spec) else job
         job_id = begun if isinstance(begun, str) else begun.job.id
         if isinstance(begun, str):
             taken_up(self._service, begun, accept_changes=accept_changes)

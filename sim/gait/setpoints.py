@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,6 +44,10 @@ class Setpoints:
     cycle: Floats  # (R, J)
     stop: Floats  # (S + 1, J)
     cycles: int  # of the scenario
+
+    @property
+    def parts(self) -> dict[str, Floats]:
+        return {"start": self.start, "cycle": self.cycle, "stop": self.stop}
 
     @property
     def walk(self) -> Floats:
@@ -92,7 +96,17 @@ def setpoints(robot: Robot, scenario: Scenario, rate: float, *, held: bool = Tru
     return Setpoints((*robot.joint_names, *fixed), cycle_time / rows, start, cycle, stop, cycles)
 
 
-def csv_text(joints: Sequence[str], step: float, rows: Floats) -> str:
+def trajectory_files(points: Mapping[str, Setpoints]) -> dict[str, bytes]:
+    """Write the files of all scenarios by name."""
+    files = {}
+    for name, of in points.items():
+        for part, rows in of.parts.items():
+            files[f"{name}-{part}.csv"] = _csv_text(of.joints, of.step, rows).encode()
+        files[f"{name}.yaml"] = _joint_trajectory_yaml(of).encode()
+    return files
+
+
+def _csv_text(joints: Sequence[str], step: float, rows: Floats) -> str:
     """Write rows (T, J) [rad] with their time [s]."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
@@ -101,7 +115,7 @@ def csv_text(joints: Sequence[str], step: float, rows: Floats) -> str:
     return file.getvalue()
 
 
-def joint_trajectory_yaml(points: Setpoints) -> str:
+def _joint_trajectory_yaml(points: Setpoints) -> str:
     """Write a walk as a ROS 2 message, trajectory_msgs/msg/JointTrajectory.
 
     It keeps the rules of ros2_control's joint_trajectory_controller (validate_trajectory_msg): all

@@ -172,9 +172,9 @@ ControllerOption = Annotated[
     str | None,
     typer.Option(
         "--controller",
-        help="Motor controller: fuzzy-pi, fuzzy-pi-3, p, pi, pid or, for torque-controlled"
-        " actuators, joint-pd [default: that of the job or spec, else of the robot's folder, else"
-        " fuzzy-pi].",
+        help="Motor controller: fuzzy-pi, fuzzy-pi-3, p, pi, pid, joint-pd for torque-controlled"
+        " actuators, or servo for position-controlled servos [default: that of the job or spec,"
+        " else of the robot's folder, else fuzzy-pi].",
     ),
 ]
 

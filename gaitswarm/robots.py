@@ -251,6 +251,8 @@ def standing_scenario(robot: Robot) -> Scenario:
 
 def standing_drive(robot: Robot) -> tuple[str, dict[str, float]]:
     """A controller that holds all joints."""
+    if robot.description.servos:
+        return "servo", {"P": max(servo.default_p for servo in robot.description.servos)}
     if not robot.is_torque_controlled:
         return "p", {"P": 1.0}
     stiffness = min(_STIFF * float(np.median(robot.actuators().torque_limit)), LARGEST_GAIN)

@@ -200,7 +200,9 @@ class ControllerContract:
                 law = self.controller.compile(design | {one.name: other})
                 gains = (law.proportional_gain, law.integral_gain, law.derivative_gain)
                 assert all(isinstance(gain, int) for gain in gains)
-                check_gains(law, torque=load_robot(self.robot).is_torque_controlled)
+                robot = load_robot(self.robot)
+                servo = robot.servos is not None
+                check_gains(law, torque=robot.is_torque_controlled, servo=servo)
 
     def test_the_same_design_is_the_same_law(self) -> None:
         first, second = (self.controller.compile(self.walking_design) for _ in range(2))

@@ -30,6 +30,7 @@ from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.walk import (
     NO_JOINT_PD,
+    NO_SERVO,
     Kernel,
     Precision,
     Walking,
@@ -249,6 +250,8 @@ def check_gait(
 def check_drives(law: ControlLaw, robot: RobotChoice) -> None:
     if law.joint_pd is not None and not load_robot(robot).is_torque_controlled:
         raise SimulationInputError(NO_JOINT_PD)
+    if law.servo is not None and load_robot(robot).servos is None:
+        raise SimulationInputError(NO_SERVO)
 
 
 def prepare(

@@ -185,3 +185,55 @@ OPERATION void vec_sincos(vec x, vec *sine, vec *cosine)
   *sine = (vec)((ivec)vec_select(odd, c, s) ^ sign_s);
   *cosine = (vec)((ivec)vec_select(odd, s, c) ^ sign_c);
 }
+
+/* Bits of a real's exponent above those of its fraction. */
+#ifdef SINGLE
+#define FRACTION_BITS_OF_REAL 23
+#define BIAS 127
+#define MOST_EXPONENT 87.0
+#else
+#define FRACTION_BITS_OF_REAL 52
+#define BIAS 1023
+#define MOST_EXPONENT 708.0
+#endif
+
+/* e^x, within 1e-15 (floats 1e-7) of its size: 2^n e^y with |y| <= ln 2 / 2, and Taylor's polynomial. */
+OPERATION vec vec_exp(vec x)
+{
+  const vec within = vec_min(vec_max(x, SPLAT(-MOST_EXPONENT)), SPLAT(MOST_EXPONENT));
+  const vec rounded = vec_fma(within, SPLAT(0x1.71547652b82fep+0), SPLAT(ROUNDER));
+  const vec n = rounded - SPLAT(ROUNDER);
+#ifdef SINGLE
+  const vec y = vec_fnma(n, SPLAT(-0x1.05c61p-29), vec_fnma(n, SPLAT(0x1.62e43p-1), within));
+  int terms = 7;
+#else
+  const vec y = vec_fnma(n, SPLAT(0x1.abc9e3b39803fp-56), vec_fnma(n, SPLAT(0x1.62e42fefa39efp-1), within));
+  int terms = 13;
+#endif
+  vec sum = SPLAT(1.0);
+  for (; terms > 0; terms--) sum = vec_fma(sum * y, SPLAT(1.0 / terms), SPLAT(1.0));
+  return sum * (vec)(((ivec)rounded + BIAS) << FRACTION_BITS_OF_REAL);
+}
+
+/* ln x of a positive x: e ln 2 + 2 artanh f with x = 2^e (1 + f) / (1 - f); about -BIAS ln 2 for 0. */
+OPERATION vec vec_log(vec x)
+{
+  const ivec one = (ivec)SPLAT(1.0), fraction = ISPLAT(((integer)1 << FRACTION_BITS_OF_REAL) - 1);
+  const vec whole = (vec)(((ivec)x & fraction) | one);
+  const ivec large = whole > SPLAT(0x1.6a09e667f3bcdp+0);
+  const vec m = vec_select(large, whole * SPLAT(0.5), whole);
+  const ivec e = ((ivec)x >> FRACTION_BITS_OF_REAL) - BIAS - large;
+  const vec f = (m - SPLAT(1.0)) / (m + SPLAT(1.0)), z = f * f;
+#ifdef SINGLE
+  int terms = 9;
+#else
+  int terms = 21;
+#endif
+  vec sum = SPLAT(0.0);
+  for (; terms > 0; terms -= 2) sum = vec_fma(sum, z, SPLAT(2.0 / terms));
+  const vec exponent = (vec)(e + (ivec)SPLAT(ROUNDER)) - SPLAT(ROUNDER);
+  return vec_fma(exponent, SPLAT(0x1.62e42fefa39efp-1), sum * f);
+}
+
+/* x^y of x >= 0 and y > 0. */
+OPERATION vec vec_pow(vec x, vec y) { return vec_exp(y * vec_log(x)); }

@@ -10,6 +10,7 @@ from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
 from gaitswarm.sim.controllers.fuzzy_pi_3 import FuzzyPi3
 from gaitswarm.sim.controllers.joint_pd import JointPdController
 from gaitswarm.sim.controllers.linear import PI, PID, P
+from gaitswarm.sim.controllers.servo import ServoController
 from gaitswarm.sim.plugins import KnownName, Plugin, Registry, check_is, check_name
 
 
@@ -28,6 +29,7 @@ CONTROLLERS: Final = Registry[Controller](
         "pi": PI,
         "pid": PID,
         "joint-pd": JointPdController(),
+        "servo": ServoController(),
     },
     _accepted,
 )

@@ -113,6 +113,7 @@ class ControlLaw:
         integral_gain: with 32 fraction bits.
         derivative_gain: with 16 fraction bits.
         joint_pd: of torque-controlled actuators, in floating point.
+        servo: P of position-controlled servos [units of their register].
     """
 
     proportional_gain: int = 0
@@ -121,6 +122,15 @@ class ControlLaw:
     direct: Response | None = None
     integrated: Response | None = None
     joint_pd: JointPd | None = None
+    servo: float | None = None
+
+    @property
+    def inner(self) -> tuple[float, float, float]:
+        """Numbers of the actuators' own control: those of the joint PD, or P and 1 of servos."""
+        if self.servo is not None:
+            return self.servo, 1.0, 0.0
+        pd = self.joint_pd or JointPd()
+        return pd.stiffness, pd.damping, pd.feed_forward
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,15 @@
-"""Control tick and joint PD of the Python drivers: twins of tick.c, control.c and torque.c."""
+"""Control tick and inner loop of the Python drivers: twins of tick.c, control.c and inner.c."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.arrays import Floats, Ints
-from gaitswarm.sim.controllers.base import ControlLaw, JointPd
+from gaitswarm.sim.controllers.base import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
 from gaitswarm.sim.outcome import Status
@@ -90,16 +89,13 @@ def padded_states(rows: Sequence[Floats], ticks: int) -> Floats:
     return states
 
 
-_NO_PD: Final = JointPd()
-
-
 class InnerLoop:
     """Commands to actuators from inner tick to inner tick; DC motors keep their voltage."""
 
     def __init__(self, robot: Robot, setup: WalkSetup, coding: Coding) -> None:
         self._limit = robot.actuators().torque_limit if robot.is_torque_controlled else None
         self._setup, self._coding = setup, coding
-        self._pd = setup.control_law.joint_pd or _NO_PD
+        self._servos, self._law = robot.servos, setup.control_law.inner
         self._target: Floats = np.zeros(robot.n_joints)
         self._speed: Floats = self._target
         self._commanded: Floats = self._target
@@ -107,25 +103,36 @@ class InnerLoop:
     def begin(self, tick: int, output: NDArray[np.int64]) -> None:
         """Begin a control tick with the controllers' output (J,) [counts]."""
         self._commanded = output.astype(np.float64) * self._coding.duty_per_count
+        desired, carrying = self._setup.desired, self._setup.feed_forward
+        if self._servos is not None:
+            codes = desired[tick].astype(np.int64)
+            self._target = coarsen(codes, self._coding.angle_step).astype(np.float64)
         if self._limit is None:
             return
-        desired, carrying = self._setup.desired, self._setup.feed_forward
         later = min(tick + 1, len(desired) - 1)
         # The last target has no successor: the speed before it continues.
         further = desired[later].astype(np.int64) - desired[max(later - 1, 0)]
         self._target = desired[tick] / self._coding.angle_counts
         self._speed = further / self._coding.angle_counts * float(CONTROL_RATE)
         if carrying is not None:
-            share = self._pd.feed_forward * carrying[tick] / self._limit
+            share = self._law[2] * carrying[tick] / self._limit
             self._commanded = self._commanded + share
 
     def command(self, angles: Floats, rates: Floats) -> Floats:
         """Return the duty (J,) for angles [rad] and rates [rad/s] that the encoders see."""
+        stiffness, damping, _ = self._law
+        if self._servos is not None:
+            tunable, fixed, dead_band, limit = self._servos
+            error = self._target - self._coding.angle_codes(angles)
+            error = np.where(np.abs(error) > dead_band, error, 0.0)
+            share = self._commanded + error * (stiffness * tunable + damping * fixed)
+            duty: Floats = np.fmin(np.fmax(share, -limit), limit)
+            return duty
         if self._limit is None:
             return self._commanded
-        torque = self._pd.stiffness * (self._target - angles)
-        torque = torque + self._pd.damping * (self._speed - rates)
+        torque = stiffness * (self._target - angles)
+        torque = torque + damping * (self._speed - rates)
         share = self._commanded + torque * (1.0 / self._limit)
-        # A NaN becomes the lower bound, as in torque.c.
+        # A NaN becomes the lower bound, as in inner.c.
         command: Floats = np.fmin(np.fmax(share, -1.0), 1.0)
         return command

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.compiler.compilation import Target, load_library
-from gaitswarm.sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
+from gaitswarm.sim.controllers.base import ControlLaw, LookupTable, Response
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.kernel.derivation import derived_source
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
@@ -164,7 +164,7 @@ class Addresses:
                 law.derivative_gain,
                 self._table(law.direct),
                 self._table(law.integrated),
-                *dataclasses.astuple(law.joint_pd or JointPd()),
+                *law.inner,
             )
             cached = self._laws[id(law)] = packed, law
         return cached[0]
@@ -245,6 +245,7 @@ class NativeKernel:
         self.precision: Precision = "single" if library.gaitswarm_single() else "double"
         self.internal_state_size = internal_state_size(robot)
         self._joints, self._torque = robot.n_joints, robot.is_torque_controlled
+        self._servo = robot.servos is not None
         self._integrands = int(library.gaitswarm_integrands())
         self._log_width = 13 + 4 * self._joints + self.internal_state_size
         self._check(robot.description.name)
@@ -272,7 +273,7 @@ class NativeKernel:
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute all walks, `lanes` at a time, in the order of `plan_lanes`; calls share walks."""
         for law in {id(s.control_law): s.control_law for s in setups}.values():
-            check_gains(law, torque=self._torque)
+            check_gains(law, torque=self._torque, servo=self._servo)
         for setup in setups:
             setup.check(
                 joints=self._joints,

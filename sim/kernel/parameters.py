@@ -14,7 +14,7 @@ import numpy as np
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.robot import Robot
-from gaitswarm.sim.robot.actuators import DryFriction
+from gaitswarm.sim.robot.actuators import DIRECTIONAL_FRICTION, DryFriction
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG, ContactLaw
 from gaitswarm.sim.robot.inertia import parallel_axis
 from gaitswarm.sim.scenario import Scenario
@@ -32,7 +32,7 @@ HOLDING_FREQUENCY: Final = 1000.0
 """Of a rotor alone on the spring of its gear's dry friction [rad/s]; critically damped."""
 
 DRY_FRICTION: Final = tuple(DryFriction.model_fields)
-"""Fields of the parameters of dry friction, at the joints."""
+"""Fields of the parameters of dry friction, at the joints; the last are `DIRECTIONAL_FRICTION`."""
 
 SHOVE_DURATION: Final = 0.1
 """Duration of a shove's constant force [s]."""
@@ -80,6 +80,13 @@ _OF_THE_BODY: Final = (
 )
 
 
+def _has(robot: Robot, friction: str) -> bool:
+    """Whether the kernel has this field of dry friction."""
+    if friction in DIRECTIONAL_FRICTION:
+        return robot.has_directional_friction
+    return robot.has_dry_friction
+
+
 class Layout:
     """Position of each parameter in the kernel's flat parameter vector.
 
@@ -88,8 +95,8 @@ class Layout:
     supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every joint
     (J each), push (3: force on the body's origin along the world's axes, during a shove), backlash
     (J, with backlash) and displaced (1, with backlash: whether disturbances are angles),
-    `DRY_FRICTION` (J each, if the robot has any), and by foot (L each) the parameters of the
-    contact law.
+    `DRY_FRICTION` (J each, if the robot has any; so those of `DIRECTIONAL_FRICTION`), and by foot
+    (L each) the parameters of the contact law.
 
     Attributes:
         by_limb: fields with values for each limb, and the number of these.
@@ -114,7 +121,7 @@ class Layout:
             "push": 3,
             "backlash": n_joints if robot.has_backlash else 0,
             "displaced": 1 if robot.has_backlash else 0,
-            **dict.fromkeys(DRY_FRICTION, n_joints if robot.has_dry_friction else 0),
+            **{name: n_joints * _has(robot, name) for name in DRY_FRICTION},
             **dict.fromkeys(law.parameters, n_feet),
         }
         limb = {n_joints: JOINTS_PER_LEG, n_feet: 1}
@@ -209,7 +216,7 @@ def pack_parameters(
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         displaced=float(displaced) if robot.has_backlash else np.empty(0),
         **{
-            name: getattr(actuators, name) if robot.has_dry_friction else np.empty(0)
+            name: getattr(actuators, name) if _has(robot, name) else np.empty(0)
             for name in DRY_FRICTION
         },
         **by_foot,

@@ -49,7 +49,11 @@ class ReferenceKernel:
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute the walks one after the other."""
         for setup in setups:
-            check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
+            check_gains(
+                setup.control_law,
+                torque=self._robot.is_torque_controlled,
+                servo=self._robot.servos is not None,
+            )
             setup.check(
                 joints=self._model.kick.numel_in(3),
                 internal_state=self.internal_state_size,

@@ -292,14 +292,21 @@ NO_JOINT_PD: Final = (
     ' robot.toml actuators of kind = "torque"'
 )
 
+NO_SERVO: Final = (
+    "controller: servo commands angles to servos, and this robot has none; choose another"
+    " controller, or give the actuators of robot.toml a table servo"
+)
+
 _LARGEST_TERM = 2**51
 """Of a control law's sums; the compiled kernel adds three of them exactly in 53 bits."""
 
 
-def check_gains(law: ControlLaw, *, torque: bool) -> None:
+def check_gains(law: ControlLaw, *, torque: bool, servo: bool = False) -> None:
     """Check that the law suits the actuators and is computed exactly by the compiled kernel."""
     if law.joint_pd is not None and not torque:
         raise SimulationInputError(NO_JOINT_PD)
+    if law.servo is not None and not servo:
+        raise SimulationInputError(NO_SERVO)
     largest = {
         "proportional_gain": law.proportional_gain * CODE_LIMIT,
         "integral_gain": law.integral_gain * CODE_LIMIT,

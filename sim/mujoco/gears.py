@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.kernel.parameters import DRY_FRICTION
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.robot import JointActuators
 
@@ -28,15 +27,28 @@ class DryFriction:
     """Dry friction in numbers: the torque that would stop a joint, within its limit."""
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
-        self._numbers = [numbers[name] for name in DRY_FRICTION]
-        self.torques, self.loads = np.zeros((2, self._numbers[0].size))
+        self._numbers = numbers
+        self.torques, self.loads = np.zeros((2, numbers["coulomb_friction"].size))
 
     def limits(self, torque: Floats, rates: Floats) -> Floats:
         """Largest friction (J,) [N m] at torques of the motors [N m] and rates [rad/s] (J,)."""
-        coulomb, stribeck, speed, share = self._numbers
-        slow = 1.0 / (1.0 + (rates / speed) ** 2)
-        limits: Floats = coulomb + stribeck * slow + share * np.abs(torque + self.loads)
-        return limits
+        p, load = self._numbers, self.loads
+        slow, share = 1.0 / (1.0 + (rates / p["stribeck_speed"]) ** 2), p["load_friction"]
+        limits: Floats = p["coulomb_friction"] + p["stribeck_friction"] * slow
+        if not p["stribeck_exponent"].size:
+            return limits + share * np.abs(torque + load)
+        exponent = p["stribeck_exponent"]
+        exponential = np.exp(-(np.abs(rates / p["stribeck_speed"]) ** exponent))
+        slow = np.where(exponent > 0.0, exponential, slow)
+        from_motor = (share + p["motor_load_friction"]) * torque
+        at_rest = np.abs(p["stribeck_motor_load"] * torque + p["stribeck_link_load"] * load)
+        driving = np.abs(load) < np.abs(torque)
+        squares = np.where(
+            driving, p["link_load_square"] * load**2, p["motor_load_square"] * torque**2
+        )
+        at_rest += np.where(torque * load > 0.0, squares, 0.0) + p["stribeck_friction"]
+        sides = np.abs(from_motor + (share + p["link_load_friction"]) * load)
+        return p["coulomb_friction"] + sides + slow * at_rest
 
     @property
     def memory(self) -> tuple[Floats, ...]:

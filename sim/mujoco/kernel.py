@@ -100,7 +100,11 @@ class MujocoKernel:
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute the walks one after the other."""
         for setup in setups:
-            check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
+            check_gains(
+                setup.control_law,
+                torque=self._robot.is_torque_controlled,
+                servo=self._robot.servos is not None,
+            )
             setup.check(
                 joints=self._robot.n_joints,
                 internal_state=internal_state_size(self._robot),

@@ -257,9 +257,8 @@ def propose_robot(
         ]
     )
     job = {
-        **proposed_control(kind, drives),
         "preference": _PREFERENCE,
-        "scenarios": propose_scenarios(stance, sole.length, names),
+        **proposed_control(kind, drives, propose_scenarios(stance, sole.length, names)),
     }
     notes += [*moved, _TWO_LEGS] if len(legs) == 2 else moved
     if frame.forward is None and sideways(legs, stance.angles):

@@ -231,6 +231,7 @@ _STIFFNESS, _DAMPING = (0.5, 10.0), (0.005, 0.1)
 def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     """Return lines of robot.toml: actuators, battery, command and sensors."""
     listed, torque = _listed_in(drives), kind == "torque"
+    step = 65536 // min((actuator.encoder_counts for actuator in listed.values()), default=65536)
     voltage = min((actuator.voltage for actuator in listed.values()), default=_VOLTAGE)
     largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / voltage
     if listed:
@@ -245,20 +246,25 @@ def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
         "resistance = 0.01                   # ohm",
         *(_TORQUE_COMMAND if torque else _pwm(voltage)),
         "",
-        "[sensors]                           # 16 bits per turn, 12 bits of current",
+        f"[sensors]                           # {65536 // step} steps per turn, 12 bits of current",
         "angle_counts = 10430.0              # per rad",
-        "angle_step = 1",
+        f"angle_step = {step}",
         f"current_counts = {_LARGEST_CODE / largest:.6g}    # an A",
         "current_step = 16",
     ]
 
 
 def proposed_control(
-    kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
+    kind: ActuatorKind,
+    drives: Sequence[Sequence[DriveNumbers]],
+    scenarios: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    """Return a controller, and bounds of its variables that follow from the torques."""
+    """Return a job's scenarios and controller, and bounds of variables that follow from both."""
+    listed = _listed_in(drives)
+    if kind == "dc" and listed:
+        return _servo_control(listed, scenarios)
     if kind == "dc":
-        return {"controller": "pid"}
+        return {"controller": "pid", "scenarios": scenarios}
     limit = float(np.median([drive.torque for of_leg in drives for drive in of_leg]))
 
     def variable(name: str, unit: str, bounds: tuple[float, float]) -> dict[str, Any]:
@@ -267,11 +273,41 @@ def proposed_control(
 
     return {
         "controller": "joint-pd",
+        "scenarios": scenarios,
         "variables": [
             variable("Kp", "N m/rad", _STIFFNESS),
             variable("Kd", "N m s/rad", _DAMPING),
             "feed_forward",
         ],
+    }
+
+
+_FRAMES: Final = {True: 100.0, False: 50.0}
+"""Rate at which a host sends angles to servos on a bus, and to hobby servos [Hz]."""
+
+
+def _servo_control(
+    listed: Mapping[str, ListedActuator], scenarios: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """P varies if it can be set, and the gait; the host holds its angles between frames."""
+    lift = scenarios[0]["height"]
+    bounds = {
+        "height": (round(0.5 * lift, 4), round(1.5 * lift, 4), "m"),
+        "duty_factor": (0.5, 0.7, "1"),
+    }
+    tunable = [actuator.bounds_p for actuator in listed.values() if actuator.bounds_p]
+    if tunable:
+        bounds = {"P": (*tunable[0], "register"), **bounds}
+    variables = [
+        {"name": name, "low": low, "high": high, "unit": unit}
+        for name, (low, high, unit) in bounds.items()
+    ]
+    rate = min(_FRAMES[actuator.bounds_p is not None] for actuator in listed.values())
+    return {
+        "controller": "servo",
+        "scenarios": [{**scenario, "trajectory_rate": rate, "fir_ms": 0} for scenario in scenarios],
+        "variables": variables,
+        **({} if tunable else {"fixed": {"P": 1.0}}),
     }
 
 
@@ -319,6 +355,23 @@ def _listed_tables(name: str, actuator: ListedActuator) -> list[str]:
         f"[actuators.{name}]",
         f"motor = {quoted(name)}",
         f"gearhead = {quoted(name)}",
+        *_position_loop(name, actuator),
+    ]
+
+
+def _position_loop(name: str, actuator: ListedActuator) -> list[str]:
+    if actuator.servo is None:
+        return []
+    loop = actuator.servo
+    guessed = "    # guessed" if "servo.position_gain" in actuator.guessed else ""
+    return [
+        "",
+        f"[actuators.{name}.servo]",
+        f"position_gain = {loop.position_gain}{guessed}    # duty per rad and unit of P",
+        f"duty_limit = {loop.duty_limit}",
+        f"dead_band = {loop.dead_band}    # rad",
+        f"default_p = {loop.default_p}    # of the register P",
+        *([] if loop.tunable else ["tunable = false"]),
     ]
 
 

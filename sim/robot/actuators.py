@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
@@ -39,11 +40,19 @@ class Motor(Data):
     viscous_friction: Number = Field(ge=0.0, description="B_M [N m s/rad], motor side")
 
 
+def _share(description: str) -> Any:
+    return Field(default=0.0, ge=0.0, lt=1.0, exclude_if=operator.not_, description=description)
+
+
 class DryFriction(Data):
     """Dry friction at a gear's output, which also holds the gear at rest.
 
-    The limit is coulomb_friction + stribeck_friction / (1 + (rate / stribeck_speed)^2) +
-    load_friction |torque of the motor + torque passed to the link|.
+    With the torque tau_M of the motor, tau_L passed to the link, and s = 1 / (1 + (rate /
+    stribeck_speed)^2), or exp(-|rate / stribeck_speed|^stribeck_exponent), the limit is
+    coulomb_friction + |k_M tau_M + k_L tau_L| + s (stribeck_friction + |stribeck_motor_load tau_M +
+    stribeck_link_load tau_L| + Q), where k_M = load_friction + motor_load_friction, k_L =
+    load_friction + link_load_friction, and Q, if both torques have the same direction, is
+    link_load_square tau_L^2 where |tau_L| < |tau_M|, else motor_load_square tau_M^2.
     """
 
     coulomb_friction: Number = Field(
@@ -61,6 +70,27 @@ class DryFriction(Data):
         lt=1.0,
         description="part of the sum of the torques on both sides of the gear [1]",
     )
+    stribeck_exponent: Number = Field(
+        default=0.0,
+        ge=0.0,
+        le=20.0,
+        exclude_if=operator.not_,
+        description="of an exponential decay with speed; 0 for Hess and Soom's curve [1]",
+    )
+    motor_load_friction: Number = _share("further part of the motor's torque [1]")
+    link_load_friction: Number = _share("further part of the torque passed to the link [1]")
+    stribeck_motor_load: Number = _share("part of the motor's torque at rest [1]")
+    stribeck_link_load: Number = _share("part of the torque passed to the link at rest [1]")
+    motor_load_square: Number = _share(
+        "part of the square of the motor's torque at rest, where the link drives [1/(N m)]"
+    )
+    link_load_square: Number = _share(
+        "part of the square of the link's torque at rest, where the motor drives [1/(N m)]"
+    )
+
+
+DIRECTIONAL_FRICTION: Final = tuple(DryFriction.model_fields)[4:]
+"""Fields of dry friction that distinguish motor and link, or decay exponentially with speed."""
 
 
 class Gearhead(DryFriction):
@@ -97,6 +127,22 @@ class Shaft(Data):
     )
 
 
+class PositionLoop(Data):
+    """Position control in a servo's firmware: duty = P position_gain error, with a dead band."""
+
+    position_gain: Number = Field(
+        gt=0.0, description="duty of the PWM per error and unit of P [1/rad]"
+    )
+    duty_limit: Number = Field(default=1.0, gt=0.0, le=1.0, description="largest duty [1]")
+    dead_band: Number = Field(
+        default=0.0, ge=0.0, le=0.5, description="error up to which the motor is off [rad]"
+    )
+    default_p: Number = Field(
+        gt=0.0, le=LARGEST_OUTPUT, description="P of the firmware [units of its register]"
+    )
+    tunable: bool = Field(default=True, description="whether P can be set")
+
+
 class Actuator(Shaft):
     """DC motor, gearhead and bevel gear of one joint."""
 
@@ -106,6 +152,11 @@ class Actuator(Shaft):
     motor: PartName
     gearhead: PartName
     bevel: Number = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
+    servo: PositionLoop | None = Field(
+        default=None,
+        exclude_if=operator.not_,
+        description="position control of a servo; of all actuators of the legs or of none",
+    )
 
 
 class TorqueActuator(Shaft, DryFriction):

@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field, model_validator
 from gaitswarm.sim.input import Lines
 from gaitswarm.sim.robot.actuators import (
     CONTROL_RATE,
+    FASTEST_INNER_RATE,
     LARGEST_OUTPUT,
     Actuator,
     ActuatorKind,
@@ -17,6 +18,7 @@ from gaitswarm.sim.robot.actuators import (
     Data,
     Gearhead,
     Motor,
+    PositionLoop,
     TorqueCommand,
 )
 from gaitswarm.sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName, Sentence
@@ -26,6 +28,10 @@ JOINTS_PER_LEG = 3
 
 MOST_COUNTS: Final = 10**8
 """Largest number of counts per unit; codes of some units then fit into 32 bits."""
+
+
+def _is_default_rate(rate: int) -> bool:
+    return rate == 1000
 
 
 def _is_none(value: Any) -> bool:
@@ -188,6 +194,14 @@ class RobotDescription(Data):
         default=False,
         description="model elastic shafts between motors and links, even without backlash",
     )
+    servo_rate: int = Field(
+        default=1000,
+        ge=CONTROL_RATE,
+        le=FASTEST_INNER_RATE,
+        multiple_of=CONTROL_RATE,
+        exclude_if=_is_default_rate,
+        description="frequency of the servos' position control [Hz]; for servos only",
+    )
     motors: dict[PartName, Motor] = Field(default={}, description="of DC actuators, by name")
     gearheads: dict[PartName, Gearhead] = Field(default={}, description="likewise")
     actuators: dict[PartName, AnyActuator]
@@ -289,10 +303,36 @@ class RobotDescription(Data):
         return self.actuators[self.legs[0].actuators[0]].kind
 
     @property
+    def servos(self) -> tuple[PositionLoop, ...]:
+        """Position control of every joint, leg by leg; empty if the actuators have none."""
+        of_joints = [self.actuators[name] for leg in self.legs for name in leg.actuators]
+        return tuple(a.servo for a in of_joints if isinstance(a, Actuator) and a.servo)
+
+    @model_validator(mode="after")
+    def _servos_are_alike(self) -> RobotDescription:
+        if not self.servos:
+            return self
+        for leg in self.legs:
+            for name in leg.actuators:
+                actuator = self.actuators[name]
+                if isinstance(actuator, Actuator) and actuator.servo is None:
+                    raise ValueError(
+                        f"actuators.{name}.servo: required, as other joints have servos"
+                    )
+        defaults = {servo.default_p for servo in self.servos if servo.tunable}
+        if len(defaults) > 1:
+            raise ValueError(
+                "actuators: all servos have one P, but theirs are in different units (default_p"
+                f" {' and '.join(f'{p:g}' for p in sorted(defaults))}); set tunable = false for one"
+                " kind"
+            )
+        return self
+
+    @property
     def inner_rate(self) -> int:
-        """Frequency of the actuators' joint PD [Hz]; for DC motors that of the control."""
+        """Frequency of the actuators' own control [Hz]; without any that of the control."""
         if self.actuator_kind == "dc":
-            return CONTROL_RATE
+            return self.servo_rate if self.servos else CONTROL_RATE
         return (self.torque_command or _DEFAULT_COMMAND).rate
 
     @property

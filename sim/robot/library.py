@@ -12,19 +12,8 @@ from pydantic import Field
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.robot.actuators import ActuatorKind, Data, DryFriction
+from gaitswarm.sim.robot.actuators import ActuatorKind, DryFriction, PositionLoop
 from gaitswarm.sim.robot.bounds import Number
-
-
-class PositionLoop(Data):
-    """The position control of a servo's firmware: duty = P position_gain error."""
-
-    position_gain: Number  # duty per error and unit of P [1/rad]
-    duty_limit: Number  # largest duty [1]
-    encoder_counts: int  # per turn
-    default_p: Number  # of the firmware [units of its register]
-    bounds_p: tuple[Number, Number] | None = None  # None: cannot be set
-    dead_band: Number = 0.0  # error without reaction, to either side [rad]
 
 
 class ListedActuator(DryFriction):
@@ -43,6 +32,8 @@ class ListedActuator(DryFriction):
     torque_limit: Number | None = None
     speed_limit: Number | None = None
     knee_speed: Number | None = None
+    encoder_counts: int = 65536  # per turn
+    bounds_p: tuple[Number, Number] | None = None  # for tuning
     servo: PositionLoop | None = None
 
     @property

@@ -17,7 +17,16 @@ from pydantic import BaseModel, ValidationError
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.input import message_of, with_known_keys
-from gaitswarm.sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
+from gaitswarm.sim.robot.actuators import (
+    DIRECTIONAL_FRICTION,
+    Actuator,
+    DryFriction,
+    Gearhead,
+    Motor,
+    PositionLoop,
+    TorqueActuator,
+    TorqueCommand,
+)
 from gaitswarm.sim.robot.bounds import check_toml, shortened
 from gaitswarm.sim.robot.chain import chain_of, check_joints, check_owners
 from gaitswarm.sim.robot.description import (
@@ -46,6 +55,7 @@ _PARTS: Final[tuple[type[BaseModel], ...]] = (
     Motor,
     Gearhead,
     Actuator,
+    PositionLoop,
     TorqueActuator,
     TorqueCommand,
     Supply,
@@ -161,6 +171,13 @@ class JointActuators:
     stribeck_friction: Floats  # part at rest [N m]
     stribeck_speed: Floats  # at which the latter is halved [rad/s]
     load_friction: Floats  # part per torque on both sides of the gear [1]
+    stribeck_exponent: Floats  # of an exponential decay of the part at rest; 0 for none [1]
+    motor_load_friction: Floats  # further part per torque of the motor [1]
+    link_load_friction: Floats  # further part per torque passed to the link [1]
+    stribeck_motor_load: Floats  # the same at rest [1]
+    stribeck_link_load: Floats  # [1]
+    motor_load_square: Floats  # part per square of the motor's torque at rest [1/(N m)]
+    link_load_square: Floats  # part per square of the link's torque at rest [1/(N m)]
     backlash: Floats  # play, end to end [rad]
     shaft_stiffness: Floats  # of the closed play [N m/rad]
     shaft_damping: Floats  # of the closed play [N m s/rad]
@@ -215,9 +232,42 @@ class Robot:
         return self.description.actuator_kind == "torque"
 
     @cached_property
+    def servos(self) -> Floats | None:
+        """Position control in servos, read-only (4, J); None without servos.
+
+        Duty per error and unit of a tunable P [1/count], duty per error with another P [1/count],
+        dead band [counts] and largest duty [1].
+        """
+        servos, counts = self.description.servos, self.description.sensors.angle_counts
+        if not servos:
+            return None
+        rows = [
+            (
+                servo.position_gain / counts * servo.tunable,
+                servo.position_gain * servo.default_p / counts * (not servo.tunable),
+                servo.dead_band * counts,
+                servo.duty_limit,
+            )
+            for servo in servos
+        ]
+        columns = np.array(rows).T.copy()
+        columns.flags.writeable = False
+        return columns
+
+    @property
+    def has_inner_loop(self) -> bool:
+        """Whether actuators have their own control between control ticks."""
+        return self.is_torque_controlled or self.servos is not None
+
+    @cached_property
     def has_dry_friction(self) -> bool:
-        a = self.actuators()
-        return bool((a.coulomb_friction + a.stribeck_friction + a.load_friction).any())
+        fields = (name for name in DryFriction.model_fields if name != "stribeck_speed")
+        return any(getattr(self.actuators(), name).any() for name in fields)
+
+    @cached_property
+    def has_directional_friction(self) -> bool:
+        """Whether dry friction distinguishes motor and link, or decays exponentially."""
+        return any(getattr(self.actuators(), name).any() for name in DIRECTIONAL_FRICTION)
 
     @property
     def body(self) -> BodyInertia:
@@ -277,11 +327,17 @@ def _dc_row(d: RobotDescription, actuator: Actuator) -> tuple[float, ...]:
         gear.stribeck_friction * actuator.bevel,
         gear.stribeck_speed / actuator.bevel,
         gear.load_friction,
+        *_directional(gear, actuator.bevel),
         actuator.backlash,
         actuator.shaft_stiffness,
         actuator.shaft_damping,
         *(0.0,) * 4,
     )
+
+
+def _directional(friction: DryFriction, bevel: float = 1.0) -> Iterator[float]:
+    for name in DIRECTIONAL_FRICTION:
+        yield getattr(friction, name) / (bevel if name.endswith("_square") else 1.0)
 
 
 def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
@@ -298,6 +354,7 @@ def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
         actuator.stribeck_friction,
         actuator.stribeck_speed,
         actuator.load_friction,
+        *_directional(actuator),
         actuator.backlash,
         actuator.shaft_stiffness,
         actuator.shaft_damping,

@@ -103,6 +103,16 @@ def quadruped_files() -> RobotFiles:
     )
 
 
+def servo_quadruped_files() -> RobotFiles:
+    """The same robot with servos that have a position control."""
+    files = quadruped_files()
+    loops = [
+        f"[actuators.{joint}.servo]\nposition_gain = 0.158\ndefault_p = 32.0\n"
+        for joint in ("coxa", "femur", "tibia")
+    ]
+    return files.model_copy(update={"toml": "\n".join([files.toml, *loops])})
+
+
 def torque_quadruped_files(
     *, backlash: float = 0.0, line: bool = True, rate: int = 1000
 ) -> RobotFiles:

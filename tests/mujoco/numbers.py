@@ -13,6 +13,7 @@ from gaitswarm.sim.mujoco.ground import GROUNDS, Ground
 from gaitswarm.sim.mujoco.mjcf import Surroundings
 from gaitswarm.sim.mujoco.model import Feet, even_drags
 from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.actuators import DIRECTIONAL_FRICTION
 from gaitswarm.sim.robot.description import Contact
 from gaitswarm.sim.scenario import Scenario
 
@@ -27,7 +28,9 @@ def own_gears(robot: Robot, angles: Floats) -> Gears:
         "supply_voltage": np.array([supply.voltage]),
         "supply_resistance": np.array([supply.resistance]),
         **{
-            name: getattr(actuators, name) if robot.has_dry_friction else np.empty(0)
+            name: getattr(actuators, name)
+            if robot.has_dry_friction and name not in DIRECTIONAL_FRICTION
+            else np.empty(0)
             for name in DRY_FRICTION
         },
         "backlash": actuators.backlash,

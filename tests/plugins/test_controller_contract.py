@@ -6,7 +6,7 @@ import pytest
 
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.testing import ControllerContract
-from tests.examples.walks import torque_quadruped_files
+from tests.examples.walks import servo_quadruped_files, torque_quadruped_files
 
 
 class TestBuiltIn(ControllerContract):
@@ -15,3 +15,5 @@ class TestBuiltIn(ControllerContract):
         self.name = request.param
         if self.name == "joint-pd":
             self.robot = torque_quadruped_files()
+        if self.name == "servo":
+            self.robot = servo_quadruped_files()

@@ -45,8 +45,8 @@ def test_the_last_matching_pattern_names_the_actuator() -> None:
 
 
 def test_servos_of_different_voltages_share_the_lowest() -> None:
-    robot = made_with({"*": "mx64", "*_calf_joint": "xl330"})
-    assert robot.description.supply.voltage == 5.0
+    robot = made_with({"*": "mx64", "*_calf_joint": "xl320"})
+    assert robot.description.supply.voltage == 7.4
 
 
 @pytest.mark.parametrize(
@@ -98,3 +98,15 @@ def test_help_lists_all_names(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["robot", "init", "--help"]) == 0
     text = capsys.readouterr().out
     assert [name for name in listed_actuators() if name not in text] == []
+
+
+def test_the_documentation_lists_their_names_and_motors() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "robots.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| `")]
+    shown = {cells[0].strip("`"): cells[1:] for cells in rows if len(cells) == 7}
+    assert list(shown) == list(listed_actuators())
+    for name, actuator in listed_actuators().items():
+        title, voltage, torque, _, speed, _ = shown[name]
+        assert (title, voltage) == (actuator.title, f"{actuator.voltage:g} V")
+        assert float(torque.split()[0]) == pytest.approx(actuator.stall_torque, rel=0.05)
+        assert float(speed.split()[0]) == pytest.approx(actuator.no_load_speed, rel=0.05)

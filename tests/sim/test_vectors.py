@@ -75,8 +75,8 @@ void gaitswarm_others(const real *a, const real *b, real *r, int64_t n)
     vec sine, cosine;
     vec_sincos(x, &sine, &cosine);
     const vec found[] = {vec_max(x, y), vec_min(x, y), vec_less(x, y), vec_abs(x), vec_sqrt(x),
-                         sine, cosine};
-    for (int i = 0; i < 7; i++) r[7 * k + i] = found[i][k % LANES];
+                         sine, cosine, vec_exp(x), vec_pow(vec_abs(x), vec_abs(y))};
+    for (int i = 0; i < 9; i++) r[9 * k + i] = found[i][k % LANES];
   }
 }
 """
@@ -197,7 +197,7 @@ def test_of_a_nan_or_two_zeros_the_second_operand_is_the_larger_and_the_smaller(
 ) -> None:
     pairs = list(itertools.product(specials(precision), repeat=2))
     a, b = (np.array(side, dtype=TYPES[precision]) for side in zip(*pairs, strict=True))
-    larger, smaller = call(aim, "others", a, b, results=7)[:, :2].T
+    larger, smaller = call(aim, "others", a, b, results=9)[:, :2].T
     np.testing.assert_array_equal(bits(larger), bits(np.where(a > b, a, b)))
     np.testing.assert_array_equal(bits(smaller), bits(np.where(a < b, a, b)))
 
@@ -205,8 +205,21 @@ def test_of_a_nan_or_two_zeros_the_second_operand_is_the_larger_and_the_smaller(
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_every_target_gives_the_bits_of_the_widest(precision: Precision) -> None:
     a, b, _ = triples(precision)
-    widest = bits(call(target(), "others", a, b, results=7))
+    widest = bits(call(target(), "others", a, b, results=9))
     for aim in HERE:
         np.testing.assert_array_equal(
-            bits(call(aim, "others", a, b, results=7)), widest, err_msg=str(aim)
+            bits(call(aim, "others", a, b, results=9)), widest, err_msg=str(aim)
         )
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_powers_are_accurate_and_zero_stays_about_zero(precision: Precision) -> None:
+    kind, accuracy = TYPES[precision], {"double": 1e-13, "single": 2e-5}[precision]
+    a = np.concatenate([np.linspace(0.0, 20.0, 401), np.geomspace(1e-6, 1e3, 100)]).astype(kind)
+    for exponent in (0.25, 0.84, 3.0, 8.7):
+        b = np.full_like(a, exponent)
+        *_, exponential, power = call(target(), "others", a, b, results=9).T
+        wide, steep = a.astype(np.float64), b.astype(np.float64)
+        kept = wide < 80.0
+        np.testing.assert_allclose(exponential[kept], np.exp(wide[kept]), rtol=accuracy)
+        np.testing.assert_allclose(power, wide**steep, rtol=accuracy, atol=1e-9)

@@ -54,24 +54,38 @@ class DryFriction:
     Below its limit it is a spring with a damper, so that a loaded joint comes to rest; at the limit
     it slips. Spring and damper are in proportion to the rotor's inertia, so that a step resolves
     them whatever the gear carries. The limit is that of Duclusaud et al., Extended Friction Models
-    for the Physics Simulation of Servo Actuators (2025), with Hess and Soom's curve of Stribeck
-    (1990).
+    for the Physics Simulation of Servo Actuators (2025), M6, also with Hess and Soom's curve of
+    Stribeck (1990).
     """
 
-    coulomb: Scalar  # [N m]
-    stribeck: Scalar  # [N m]
-    stribeck_speed: Scalar  # [rad/s]
-    share: Scalar  # of the load [1]
+    p: Mapping[str, Scalar]  # of `DRY_FRICTION`; the directional fields only if there are any
     spring: Scalar  # torque of the spring before the step [N m]
     load: Scalar  # torque passed to the link in the step before [N m]
 
     def limit(self, torque: Scalar, rate: Scalar) -> Scalar:
         """Largest friction [N m] of a motor with a torque [N m] at the joint's rate [rad/s]."""
-        square, knee = rate * rate, self.stribeck_speed * self.stribeck_speed
+        p, load = self.p, self.load
+        square, knee = rate * rate, p["stribeck_speed"] * p["stribeck_speed"]
+        slow, share = knee / (knee + square), p["load_friction"]
+        if "stribeck_exponent" not in p:
+            return (
+                p["coulomb_friction"]
+                + p["stribeck_friction"] * slow
+                + share * ca.fabs(torque + load)
+            )
+        exponent = p["stribeck_exponent"]
+        exponential = ca.exp(-((ca.fabs(rate) / p["stribeck_speed"]) ** exponent))
+        slow = slow + (exponent > 0.0) * (exponential - slow)
+        from_motor = (share + p["motor_load_friction"]) * torque
+        at_rest = p["stribeck_motor_load"] * torque + p["stribeck_link_load"] * load
+        motor, link = torque * torque, load * load
+        driving = link < motor
+        squares = p["motor_load_square"] * motor
+        squares = squares + driving * (p["link_load_square"] * link - squares)
         return (
-            self.coulomb
-            + self.stribeck * (knee / (knee + square))
-            + self.share * ca.fabs(torque + self.load)
+            p["coulomb_friction"]
+            + ca.fabs(from_motor + (share + p["link_load_friction"]) * load)
+            + slow * (p["stribeck_friction"] + ca.fabs(at_rest) + (torque * load > 0.0) * squares)
         )
 
 
@@ -108,8 +122,8 @@ def friction_of(
 ) -> Friction:
     dry = None
     if springs:
-        coulomb, stribeck, speed, share = (p[name][joint] for name in DRY_FRICTION)
-        dry = DryFriction(coulomb, stribeck, speed, share, springs[joint], loads[joint])
+        numbers = {name: p[name][joint] for name in DRY_FRICTION if p[name]}
+        dry = DryFriction(numbers, springs[joint], loads[joint])
     return Friction(p["viscous"][joint], dry, timestep)
 
 

@@ -24,6 +24,8 @@ def robot_constants(robot: Robot) -> NDArray[np.float64]:
     numbers = electrical_constants(joints)
     for limb, kind in zip(limbs, kinds, strict=True):
         numbers += kind.numbers_of(limb)
+    if robot.servos is not None:
+        numbers += robot.servos.ravel().tolist()
     constants = np.array(numbers)
     constants.flags.writeable = False
     return constants

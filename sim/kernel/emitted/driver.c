@@ -21,7 +21,7 @@ typedef struct {
   Past past;
   int filtered, disturbed, shoved; /* whether any lane has a current filter, disturbances or a shove */
   vec sensed[NJ], smoothing;
-#if TORQUE
+#if INNER
   Inner inner;
 #endif
 #if UNEVEN
@@ -77,7 +77,7 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
   if (w->smoothing[0] < 1.0) s->filtered = 1;
   if (w->disturbance) s->disturbed = 1;
   if (w->shove[1]) s->shoved = 1;
-#if TORQUE
+#if INNER
   OF_LANE(s->inner.stiffness, k) = w->law.stiffness;
   OF_LANE(s->inner.damping, k) = w->law.damping;
 #endif
@@ -98,12 +98,12 @@ static void leave(Lanes *s, int k, int64_t status)
 
 static dvec encoder(const Lanes *s, int j, int h) { return BACKLASH ? s->motor[j][h] : s->q[7 + j][h]; }
 
-#if TORQUE
-/* Joint PD of lanes whose inner tick begins. */
+#if INNER
+/* Control in the actuators of lanes whose inner tick begins. */
 static void inner_tick(Lanes *s, const Coding *c, const divec *begins, const dvec *ago)
 {
-  joint_pd(&s->inner, s->duty, BACKLASH ? s->motor : s->q + 7, BACKLASH ? s->internal + NJ : s->v + 6,
-           c->robot + NJ, begins, ago);
+  inner_law(&s->inner, c, s->duty, BACKLASH ? s->motor : s->q + 7,
+            BACKLASH ? s->internal + NJ : s->v + 6, begins, ago);
 }
 #endif
 
@@ -120,7 +120,7 @@ static void begin_ticks(Lanes *s, const Coding *c)
     OF_LANE(s->timestep, k) = w->parameters[TIMESTEP] / (double)s->rounds_left[k];
     s->p[TIMESTEP][k] = (real)OF_LANE(s->timestep, k);
     s->smoothing[k] = (real)w->smoothing[landing];
-#if TORQUE
+#if INNER
     s->inner.period[k] = s->rounds_left[k] * c->substeps / c->inner_ticks;
     s->inner.left[k] = s->inner.period[k] + 1;
 #endif
@@ -170,14 +170,14 @@ static void control_tick(Lanes *s, const Coding *c)
   for (int j = 0; j < NJ; j++)
     for (int h = 0; h < HALVES; h++) {
       const dvec duty = counts[j][h] * DSPLAT(c->duty_per_count);
-#if TORQUE
+#if INNER
       wide *const commanded = &s->inner.commanded[j];
       (*commanded)[h] = dvec_select(s->begins[h], duty, (*commanded)[h]);
 #else
       vec_narrow(&s->duty[j], h, dvec_select(s->begins[h], duty, vec_widened(&s->duty[j], h)));
 #endif
     }
-#if TORQUE
+#if INNER
   const wide now = {DSPLAT(0.0)};
   for (int k = 0; k < LANES; k++)
     if (OF_LANE(s->begins, k)) set_targets(&s->inner, k, s->walker[k], s->tick[k], c);
@@ -276,7 +276,7 @@ static void round_of_steps(Lanes *s, const Coding *c)
 #endif
   for (int h = 0; h < HALVES; h++) drift(s, h, 0.5);
   for (int64_t left = c->substeps; left-- > 0;) {
-#if TORQUE
+#if INNER
     divec begins[HALVES];
     if (due(&s->inner, begins)) {
       /* Positions are those of the step's middle. */

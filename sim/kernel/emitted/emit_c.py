@@ -126,6 +126,7 @@ _BINARY: Final[dict[str, str]] = {
     "OP_FMAX": "vec_max({0}, {1})",
     "OP_FMIN": "vec_min({0}, {1})",
     "OP_LT": "vec_less({0}, {1})",
+    "OP_POW": "vec_pow({0}, {1})",
 }
 _UNARY: Final[dict[str, str]] = {
     "OP_NEG": "-{0}",
@@ -133,10 +134,17 @@ _UNARY: Final[dict[str, str]] = {
     "OP_TWICE": "{0} + {0}",
     "OP_SQRT": "vec_sqrt({0})",
     "OP_FABS": "vec_abs({0})",
+    "OP_EXP": "vec_exp({0})",
     "OP_INV": "SPLAT(1.0) / {0}",
 }
 
-_LATENCIES: Final[dict[str, int]] = {"OP_DIV": 13, "OP_INV": 13, "OP_SQRT": 13}
+_LATENCIES: Final[dict[str, int]] = {
+    "OP_DIV": 13,
+    "OP_INV": 13,
+    "OP_SQRT": 13,
+    "OP_EXP": 70,
+    "OP_POW": 150,
+}
 """Of operations slower than sums and products [operations executed meanwhile]."""
 
 

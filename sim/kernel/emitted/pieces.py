@@ -75,7 +75,8 @@ class _Pieces:
         starts = np.concatenate([[2 * self._n], 2 * self._n + np.cumsum(counts)]).tolist()
         return "\n".join(
             [
-                f"#define NR {starts[-1]}",
+                f"#define SERVOS {starts[-1]}",
+                f"#define NR {starts[-1] + 4 * self._n * (self._robot.servos is not None)}",
                 *self._text,
                 _KICK.format(
                     limbs=len(self._limbs),

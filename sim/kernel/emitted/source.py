@@ -36,7 +36,9 @@ def kernel_identity(
         robot.description.contact_law,
         robot.has_backlash,
         robot.has_dry_friction,
+        robot.has_directional_friction,
         robot.is_torque_controlled,
+        robot.servos is not None,
         uneven,
     )
     kinds = limb_kinds(limbs_of(robot))
@@ -58,7 +60,8 @@ def kernel_source(robot: Robot, precision: Precision = "double", *, uneven: bool
             f"#define NP {layout.size}",
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",
-            f"#define TORQUE {int(robot.is_torque_controlled)}",
+            f"#define INNER {int(robot.has_inner_loop)}",
+            f"#define SERVO {int(robot.servos is not None)}",
             f"#define UNEVEN {int(uneven)}",
             f"#define TIMESTEP {layout.slices['timestep'].start}",
             f"#define PUSH {layout.slices['push'].start}",
@@ -72,7 +75,7 @@ def kernel_source(robot: Robot, precision: Precision = "double", *, uneven: bool
             _file("control.c"),
             _file("terrain.c"),
             _file("pool.c"),
-            *([_file("torque.c")] if robot.is_torque_controlled else []),
+            *([_file("inner.c")] if robot.has_inner_loop else []),
             _file("driver.c"),
         ]
     )

@@ -18,7 +18,7 @@ from fastapi import Depends, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from gaitswarm.api.dependencies import ExistingJob, ServerSettings
+from gaitswarm.api.dependencies import ExistingJob, JobId, ServerSettings, Service
 from gaitswarm.api.events import Revocation
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
 from gaitswarm.services.optimizer.access import Scope as TokenScope
@@ -294,6 +294,11 @@ async def may_administer(token: RequestToken) -> None:
         raise Forbidden(
             f"the token {token.name!r} has scope `{token.scope}`; use one of scope `admin`"
         )
+
+
+def may_restore(job_id: JobId, service: Service, token: RequestToken) -> None:
+    """Require the permission to command the deleted job of the path."""
+    may_command(service.store.deleted_job(job_id), token)
 
 
 def may_command(job: ExistingJob, token: RequestToken) -> None:

@@ -28,6 +28,7 @@ from gaitswarm.api.access import (
     check_may_prioritize,
     may_administer,
     may_command,
+    may_restore,
     may_submit,
 )
 from gaitswarm.api.dependencies import (
@@ -97,6 +98,7 @@ _ACCESS: Final[Mapping[str, list[Any]]] = {
     "read": [],
     "submit": [Depends(may_submit)],
     "command": [Depends(may_command)],
+    "restore": [Depends(may_restore)],
     "admin": [Depends(may_administer)],
 }
 

@@ -415,10 +415,16 @@ def label(
 def delete(
     job_id: JobId,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Restore a job deleted in the last 24 hours, by its id.")
+    ] = False,
     *,
     jobs: Jobs,
 ) -> None:
-    """Delete an ended or paused job with all its results."""
+    """Delete an ended or paused job with all its results; --undo restores it for 24 hours."""
+    if undo:
+        print_text(f"job {jobs.restore(job_id).id} is restored")
+        return
     if not yes:
         note(_loss(jobs, jobs.job(job_id)))
         if not sys.stdin.isatty():
@@ -428,6 +434,7 @@ def delete(
             return
     jobs.delete(job_id)
     print_text(f"job {job_id} is deleted")
+    note(f"to restore it within 24 hours, run: gaitswarm delete --undo {job_id}{jobs.place}")
 
 
 def _loss(jobs: Jobs, job: JobView) -> str:
@@ -436,7 +443,7 @@ def _loss(jobs: Jobs, job: JobView) -> str:
     name = f" ({job.name})" if job.name else ""
     loss = (
         f"job {job.id}{name} is {job.state}; deletion removes {job.iterations} iterations with"
-        f" {job.evaluations} evaluated designs permanently"
+        f" {job.evaluations} evaluated designs after 24 hours"
     )
     if forks:
         loss += f"\nforks that keep their copies of its iterations: {forks}"

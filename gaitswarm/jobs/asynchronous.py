@@ -80,6 +80,7 @@ class AsyncJobs:
     keep = _awaited(Jobs.keep)
     release = _awaited(Jobs.release)
     delete = _awaited(Jobs.delete)
+    restore = _awaited(Jobs.restore)
     best = _awaited(Jobs.best)
     verdict = _awaited(Jobs.verdict)
     iterations = _iterated(Jobs.iterations)

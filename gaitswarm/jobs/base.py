@@ -514,7 +514,7 @@ class Jobs(ABC):
 
     @commands("DELETE /jobs/{job_id}", "delete_job", "Delete a job", status=204)
     def delete(self, job_id: str) -> None:
-        """Delete a job with its iterations and evaluations, irrevocably.
+        """Delete a job with its iterations and evaluations; `restore` reverts this for 24 hours.
 
         Forks of it and certificates of its designs stay. Its idempotency key can be used again, and
         streams of its events end with an event `deleted`.
@@ -523,6 +523,17 @@ class Jobs(ABC):
             Conflict: It is protected, or has neither ended nor is paused; cancel it first.
         """
         self._service.store.delete_job(job_id, actor=self._context.actor)
+
+    @commands(
+        "POST /jobs/{job_id}/restore", "restore_job", "Restore a deleted job", access="restore"
+    )
+    def restore(self, job_id: str) -> JobView:
+        """Bring back a job as it was, except for its idempotency key.
+
+        Raises:
+            NotFound: It was not deleted in the last 24 hours.
+        """
+        return self._changed(self._service.store.restore_job, job_id)
 
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Follow a job until it has ended, also while it is paused.

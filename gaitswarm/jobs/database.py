@@ -118,9 +118,11 @@ class DatabaseJobs(Jobs):
         return EvaluationTable.from_pieces(job.spec, read_columns(self._service.store, job))
 
     def delete(self, job_id: str) -> None:
-        """Delete a job, and remove all of its rows."""
+        """Delete a job, and remove the rows of those that can no longer be restored."""
+        from gaitswarm.services.optimizer.store.jobs import TRASH
+
         super().delete(job_id)
-        self._service.store.purge_deleted()
+        self._service.store.purge_deleted(older_than=TRASH)
 
     def run(
         self,

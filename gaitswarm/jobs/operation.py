@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 Tag = Literal["core", "analysis", "robots", "operations"]
-Access = Literal["read", "submit", "command", "admin"]
+Access = Literal["read", "submit", "command", "restore", "admin"]
 """Permission that a token needs; `command`: to command the job of the path."""
 
 JobIdText = Annotated[

@@ -9,12 +9,13 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.jobs import TRASH
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
 
-_SECONDS_PER_ROUND: Final = 10.0
-_ROUNDS_PER_RETENTION: Final = 360
+_SECONDS_PER_ROUND: Final = 3600.0
+_SECONDS_PER_ATTEMPT: Final = 10.0
 _LARGEST_STEP: Final = 3600.0
 _STEADY_SECONDS: Final = 86_400.0
 
@@ -48,20 +49,21 @@ class Housekeeping:
         if self._thread.is_alive():
             self._thread.join()
 
-    def round(self, *, retention: bool = True) -> None:
-        """Run one round."""
-        retention = retention and self._trusts_clock()
-        if retention and self._retention is not None:
+    def round(self) -> None:
+        """Run one round, unless ages cannot be trusted."""
+        if not self._trusts_clock():
+            return
+        if self._retention is not None:
             deleted = self._store.delete_ended_before(datetime.now(UTC) - self._retention)
             for job_id in deleted:
                 _log.info("job %s deleted: it ended more than %s ago", job_id, self._retention)
-        if retention and self._audit_retention is not None:
+        if self._audit_retention is not None:
             removed = self._store.forget_audit_before(datetime.now(UTC) - self._audit_retention)
             if removed:
                 _log.info(
                     "%d audit log entries removed: older than %s", removed, self._audit_retention
                 )
-        self._store.purge_deleted(self._stop.is_set)
+        self._store.purge_deleted(self._stop.is_set, older_than=TRASH)
 
     def _trusts_clock(self) -> bool:
         """Return whether ages are right, as far as the database and this process can tell."""
@@ -79,13 +81,13 @@ class Housekeeping:
         return False
 
     def _rounds(self) -> None:
-        number = 0
         while not self._stop.is_set():
+            seconds = _SECONDS_PER_ATTEMPT
             try:
-                self.round(retention=number % _ROUNDS_PER_RETENTION == 0)
+                self.round()
+                seconds = _SECONDS_PER_ROUND
             except StoreUnavailable as error:
                 _log.warning("cannot remove deleted jobs yet: %s", error)
             except Exception:  # noqa: BLE001
                 _log.exception("cannot remove deleted jobs yet")
-            number += 1
-            self._stop.wait(_SECONDS_PER_ROUND)
+            self._stop.wait(seconds)

@@ -10,9 +10,16 @@ import httpx2
 import pytest
 
 import gaitswarm
-from gaitswarm.api.access import COOKIE, TokenGuesses, address_of, may_command, may_submit
+from gaitswarm.api.access import (
+    COOKIE,
+    TokenGuesses,
+    address_of,
+    may_command,
+    may_restore,
+    may_submit,
+)
 from gaitswarm.services.optimizer.access import Scope
-from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
@@ -169,6 +176,17 @@ def test_a_token_of_all_rights_commands_every_job(
     assert answer.status_code == 200
 
 
+def test_a_deleted_job_is_restored_by_its_owner_and_administrators_only(
+    guarded: httpx2.Client, bearer: Bearer, store: Store, spec: JobSpec
+) -> None:
+    job, _ = store.create_job(spec, owner="someone")
+    store.command(job.id, Command.CANCEL)
+    store.delete_job(job.id)
+    restore = f"/v1/jobs/{job.id}/restore"
+    assert guarded.post(restore, headers=bearer(Scope.SUBMIT)).status_code == 403
+    assert guarded.post(restore, headers=bearer(Scope.ADMIN)).status_code == 200
+
+
 def test_a_job_that_a_client_may_not_see_looks_like_a_missing_one(
     guarded: httpx2.Client, job: Job
 ) -> None:
@@ -182,9 +200,9 @@ def test_every_operation_that_changes_something_asks_who_may(serve: Serve) -> No
         if not (route.methods or set()) - {"GET", "HEAD"}:
             continue
         asked = {dependency.call for dependency in route.dependant.dependencies}
-        assert bool(asked & {may_submit, may_command}) is (route.operation_id not in QUESTIONS), (
-            route.operation_id
-        )
+        assert bool(asked & {may_submit, may_command, may_restore}) is (
+            route.operation_id not in QUESTIONS
+        ), route.operation_id
 
 
 def test_the_audit_log_names_tokens_and_is_for_administrators(

@@ -31,6 +31,18 @@ def test_a_job_is_deleted_once(client: httpx2.Client, job: Job, commit: Commit) 
     assert client.get("/v1/jobs").json()["items"] == []
 
 
+def test_a_deleted_job_is_restored_once(client: httpx2.Client, job: Job, commit: Commit) -> None:
+    commit(job, 3)
+    before = client.get(f"/v1/jobs/{job.id}").json()
+    assert client.post(f"/v1/jobs/{job.id}/restore").status_code == 404
+    client.delete(f"/v1/jobs/{job.id}")
+    assert client.post(f"/v1/jobs/{job.id}/restore").json() == before
+    assert client.get(f"/v1/jobs/{job.id}").json() == before
+    missing = client.post(f"/v1/jobs/{job.id}/restore")
+    assert missing.status_code == 404
+    assert "was deleted in the last 24 hours" in missing.json()["detail"]
+
+
 def test_links_say_when_a_job_can_be_deleted(
     client: httpx2.Client, job: Job, commit: Commit
 ) -> None:

@@ -41,6 +41,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"post {job}/fork",
         f"post {job}/cancel",
         f"delete {job}",
+        f"post {job}/restore",
         f"put {job}/priority",
         f"put {job}/keep",
         f"delete {job}/keep",

@@ -49,7 +49,17 @@ def test_without_a_terminal_deletion_requires_yes(
     assert gaitswarm("status", finished.id, "--db", db).code == 0
     deleted = gaitswarm("delete", finished.id, "--yes", "--db", db)
     assert (deleted.code, deleted.out) == (0, f"job {finished.id} is deleted\n")
+    assert f"gaitswarm delete --undo {finished.id}" in deleted.err
     assert gaitswarm("delete", finished.id, "--yes", "--db", db).code == 3
+
+
+def test_a_deletion_is_undone(gaitswarm: Gaitswarm, finished: Finished, db: Path) -> None:
+    assert gaitswarm("delete", finished.id, "--yes", "--db", db).code == 0
+    undone = gaitswarm("delete", "--undo", finished.id, "--db", db)
+    assert (undone.code, undone.out) == (0, f"job {finished.id} is restored\n")
+    assert gaitswarm("status", finished.id, "--db", db).code == 0
+    again = gaitswarm("delete", "--undo", finished.id, "--db", db)
+    assert again.code == 3 and "was deleted in the last 24 hours" in again.err
 
 
 def test_a_kept_job_is_not_deleted(gaitswarm: Gaitswarm, finished: Finished, db: Path) -> None:

@@ -10,7 +10,7 @@ from tests.library.conftest import SMALL, Finished, Reach
 pytestmark = pytest.mark.slow
 
 
-def test_a_job_that_has_ended_is_deleted_with_all_that_it_found(
+def test_a_job_that_has_ended_is_deleted_with_all_that_it_found_and_restored(
     reach: Reach, finished: Finished
 ) -> None:
     jobs = reach(finished.db)
@@ -20,6 +20,10 @@ def test_a_job_that_has_ended_is_deleted_with_all_that_it_found(
         jobs.job(finished.id)
     with pytest.raises(gaitswarm.NotFound):
         jobs.delete(finished.id)
+    assert jobs.restore(finished.id).best_fitness is not None
+    assert [restored.id for restored in jobs.jobs()] == [finished.id]
+    with pytest.raises(gaitswarm.NotFound, match="was deleted in the last 24 hours"):
+        jobs.restore(finished.id)
 
 
 def test_a_job_under_way_is_not_deleted_and_the_error_says_what_to_do(

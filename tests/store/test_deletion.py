@@ -16,6 +16,7 @@ from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.store import jobs as jobs_module
 from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.jobs import TRASH
 from gaitswarm.services.optimizer.store.tables import metadata
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
@@ -94,6 +95,38 @@ def test_rows_of_a_long_job_go_by_pieces_that_can_be_gone_on_with(
         store.iterations(claim.job.id)
     store.purge_deleted()
     assert set(rows(database_url).values()) == {0}
+
+
+def test_a_deleted_job_is_restored_as_it_was_for_a_day(
+    store: Store, clock: Clock, database_url: str
+) -> None:
+    job = ended(store, large())
+    before = rows(database_url)
+    store.delete_job(job.id)
+    clock.advance(86_399.0)
+    store.purge_deleted(older_than=TRASH)
+    assert store.deleted_job(job.id).id == job.id
+    assert store.restore_job(job.id) == job
+    assert rows(database_url) == before
+    assert len(store.evaluations(job.id, 0)) == 60
+
+    store.delete_job(job.id)
+    clock.advance(86_400.0)
+    for ask_for in (store.deleted_job, store.restore_job):
+        with pytest.raises(NotFound, match="in the last 24 hours"):
+            ask_for(job.id)
+    store.purge_deleted(older_than=TRASH)
+    assert set(rows(database_url).values()) == {0}
+
+
+def test_a_job_of_which_rows_are_gone_is_not_restored(store: Store) -> None:
+    job = ended(store, large())
+    store.delete_job(job.id)
+    asked = iter([False, True])
+    store.purge_deleted(lambda: next(asked))
+    with pytest.raises(NotFound, match="in the last 24 hours"):
+        store.restore_job(job.id)
+    store.purge_deleted(older_than=TRASH)
 
 
 def test_a_deleted_job_is_not_found(store: Store) -> None:

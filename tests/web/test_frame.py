@@ -16,9 +16,12 @@ from tests.web.visit import Visit, show_tab_again
 pytestmark = pytest.mark.slow
 
 
-def test_the_skip_link_skips_the_header(server: ServerProcess, visit: Callable[..., Visit]) -> None:
+def test_the_skip_link_skips_the_header(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
     page = visit(server.url).go("/jobs")
     expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+    expect(page.locator(f"[data-job='{finished_job}']")).to_be_visible()
     page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="Skip to content")).to_be_focused()
     page.keyboard.press("Enter")

@@ -36,7 +36,7 @@ def respond_late(route: Route) -> None:
     route.fulfill(response=answer)
 
 
-def test_deletion_states_what_is_lost_and_what_remains(
+def test_a_deleted_job_is_restored_from_the_list_and_from_its_page(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     job_id = server.submit(SMALL_JOB | {"name": "to be deleted"})
@@ -45,28 +45,25 @@ def test_deletion_states_what_is_lost_and_what_remains(
         f"/v1/jobs/{job_id}/fork", json={"from_iteration": 1, "name": "fork"}
     )
     fork = server.wait_for(forked.json()["id"], "succeeded")
-    page = visit(server.url).go(f"/jobs/{job_id}")
-
-    choose(page, "Delete…")
-    dialog = page.get_by_role("dialog")
-    expect(dialog).to_contain_text(
-        f"{job['evaluations']} evaluations in {job['iterations']} iterations are"
-        " permanently lost. Forks of the job keep their copies but lose their parent; certificates"
-        " of its designs are separate jobs and remain."
-    )
-    click_button(page, "Back")
-    expect(dialog).to_be_hidden()
-    assert server.job(job_id)["state"] == "succeeded"
+    page = visit(server.url, allowed="status of 404").go(f"/jobs/{job_id}")
 
     page.route(f"**/v1/jobs/{job_id}", respond_late)
-    choose(page, "Delete…")
-    click_button(page, "Delete the job")
+    choose(page, "Delete")
     expect(page).to_have_url(re.compile(r"/$"))
     expect(page.locator(f"a[href='/jobs/{fork['id']}']")).to_be_visible()
     expect(page.get_by_role("link", name="to be deleted")).to_have_count(0)
     assert server.client.get(f"/v1/jobs/{job_id}").status_code == 404
     left = server.client.get(f"/v1/jobs/{fork['id']}/iterations").json()["items"]
     assert len(left) == fork["iterations"]
+    expect(page.get_by_text("1 job deleted. They can be restored for 24 hours.")).to_be_visible()
+    click_button(page, "Undo")
+    expect(page.get_by_role("link", name="to be deleted")).to_be_visible()
+    assert server.job(job_id)["best"] == job["best"]
+
+    server.client.delete(f"/v1/jobs/{job_id}")
+    page.goto(f"/jobs/{job_id}")
+    click_button(page, "Restore the deleted job")
+    expect(page.get_by_role("heading", name="to be deleted")).to_be_visible()
 
 
 def test_active_and_protected_jobs_cannot_be_deleted(
@@ -76,19 +73,19 @@ def test_active_and_protected_jobs_cannot_be_deleted(
     job_id = server.submit(SMALL_SPEC)
     page = visit(server.url).go(f"/jobs/{job_id}")
     expect(command(page, "Cancel…")).to_have_count(1)
-    expect(command(page, "Delete…")).to_have_count(0)
+    expect(command(page, "Delete")).to_have_count(0)
 
     choose(page, "Cancel…")
     click_button(page, "Cancel the job")
-    expect(command(page, "Delete…")).to_have_count(1)
+    expect(command(page, "Delete")).to_have_count(1)
 
     choose(page, "Keep")
     expect(page.locator("[data-labels]")).to_have_text("kept")
-    expect(command(page, "Delete…")).to_have_count(0)
+    expect(command(page, "Delete")).to_have_count(0)
     assert server.job(job_id)["kept"]
 
     choose(page, "Release")
-    expect(command(page, "Delete…")).to_have_count(1)
+    expect(command(page, "Delete")).to_have_count(1)
     assert not server.job(job_id)["kept"]
 
 

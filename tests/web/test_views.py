@@ -114,7 +114,7 @@ def test_views_are_accessible_at_every_width(
     assert violations == {}
 
 
-DIALOGS: Final = ("Extend…", "Label…", "Fork…", "Delete…")
+DIALOGS: Final = ("Extend…", "Label…", "Fork…")
 """Buttons of an ended job that open dialogs."""
 
 

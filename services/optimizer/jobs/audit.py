@@ -27,6 +27,7 @@ class AuditAction(StrEnum):
     PRIORITIZE = "prioritize"
     CANCEL = "cancel"
     DELETE = "delete"
+    RESTORE = "restore"
     KEEP = "keep"
     RELEASE = "release"
     LABEL = "label"

@@ -55,6 +55,7 @@ class Store(Jobs, Leases, History, Recordings, Audit):
             provenance.
         moment: aware time before which entries were added, or jobs ended.
         states: in which they ended.
+        older_than: time since the deletion.
         should_stop: called between transactions; if true, the rest is left to a later call.
         quarantine_after: consecutive crashes after which a job fails.
         waiting, error: reason for waiting or failing, for users; None for neither.

@@ -91,7 +91,13 @@ _EVALUATIONS_AT_ONCE: Final = 5000
 
 _STEADY: Final = timedelta(days=1)
 
-_DELETED: Final = sa.select(jobs.c.id).where(jobs.c.deleted_at.is_not(None)).limit(1)
+NO_TIME: Final = timedelta()
+
+TRASH: Final = timedelta(hours=24)
+"""Time for which a deleted job can be restored."""
+
+_NEVER_RESTORED: Final = datetime(1970, 1, 1, tzinfo=UTC)
+"""Deletion of a job of which rows are removed."""
 
 _OF_JOBS: Final[tuple[sa.Table, ...]] = tuple(
     table
@@ -346,7 +352,8 @@ class Jobs(Aggregate):
     def delete_job(self, job_id: str, *, actor: str = LOCAL) -> None:
         """Delete a job with its history, whose rows `purge_deleted` removes; forks have copies.
 
-        Raises Conflict if it is queued, running, pausing or kept.
+        `restore_job` brings it back within `TRASH`. Raises Conflict if it is queued, running,
+        pausing or kept.
         """
         with self._database.write("delete_job") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -362,6 +369,27 @@ class Jobs(Aggregate):
                     f" {job_id}`, or DELETE /v1/jobs/{job_id}/keep"
                 )
             _mark_deleted(connection, [jobs.c.id == job_id], self._clock(connection), actor)
+
+    def deleted_job(self, job_id: str) -> Job:
+        """Return a job that can be restored. Raises NotFound."""
+        with self._database.read("deleted_job") as connection:
+            return to_job(self._deleted_row(connection, job_id))
+
+    def restore_job(self, job_id: str, *, actor: str = LOCAL) -> Job:
+        """Bring back a deleted job, without its idempotency key. Raises NotFound after `TRASH`."""
+        with self._database.write("restore_job") as connection:
+            row = self._deleted_row(connection, job_id, lock=True)
+            note_change(connection, self._clock(connection), actor, AuditAction.RESTORE, job_id)
+            return to_job(update_job(connection, row, {"deleted_at": None}))
+
+    def _deleted_row(self, connection: sa.Connection, job_id: str, *, lock: bool = False) -> Row:
+        since = self._clock(connection) - TRASH
+        query = sa.select(*COLUMNS).where(jobs.c.id == job_id, jobs.c.deleted_at > since)
+        query = query.with_for_update() if lock else query
+        row = connection.execute(query).mappings().first() if is_job_id(job_id) else None
+        if row is None:
+            raise NotFound(f"no job {job_id!r} was deleted in the last 24 hours")
+        return row
 
     def clock_jump(self) -> timedelta | None:
         """Return the clock's jump ahead in the last day, which a day without changes counts as."""
@@ -395,14 +423,18 @@ class Jobs(Aggregate):
         with self._database.write("delete_ended_before") as connection:
             return _mark_deleted(connection, expired, self._clock(connection), RETENTION)
 
-    def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
-        """Remove rows of deleted jobs in short transactions, using half of the time."""
+    def purge_deleted(
+        self, should_stop: Callable[[], bool] = lambda: False, *, older_than: timedelta = NO_TIME
+    ) -> None:
+        """Remove rows of jobs deleted before some time, in short transactions, half of the time."""
         with self._database.read("purge_deleted") as connection:
-            more = connection.scalar(_DELETED) is not None
+            before = jobs.c.deleted_at <= self._clock(connection) - older_than
+            deleted = sa.select(jobs.c.id).where(before).limit(1)
+            more = connection.scalar(deleted) is not None
         while more and not should_stop():
             begun = time.monotonic()
             with self._database.write("purge_deleted") as connection:
-                more = _remove_rows(connection)
+                more = _remove_rows(connection, deleted)
             if more:
                 time.sleep(time.monotonic() - begun)
 
@@ -530,11 +562,14 @@ def _mark_deleted(
     return ids
 
 
-def _remove_rows(connection: sa.Connection) -> bool:
+def _remove_rows(connection: sa.Connection, deleted: sa.Select[Any]) -> bool:
     """Remove some iterations of a deleted job, or its last rows. Returns whether there was one."""
-    job_id = connection.scalar(_DELETED.with_for_update(skip_locked=True))
+    job_id = connection.scalar(deleted.with_for_update(skip_locked=True))
     if job_id is None:
         return False
+    connection.execute(
+        sa.update(jobs).where(jobs.c.id == job_id).values(deleted_at=_NEVER_RESTORED)
+    )
     place, of_job = evaluations.c.iteration, evaluations.c.job_id == job_id
     first = connection.scalar(sa.select(sa.func.min(place)).where(of_job))
     end: int | None = None

@@ -1,11 +1,12 @@
 /** Job page: header, commands and tabs, updated live. */
 
 import type { FunctionComponent } from 'preact'
-import { useEffect } from 'preact/hooks'
+import { useEffect, useState } from 'preact/hooks'
 import { isReadable } from '../api/jobs'
 import type { Job } from '../api/types'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
+import { restoreJob } from '../jobs/deletion'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
 import { lazyPage } from '../router/lazy-page'
 import { navigate, usePlace } from '../router/navigation'
@@ -99,6 +100,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
                 Job {id} was deleted or belongs to another server. Look for it in the{' '}
                 <a href="/jobs">list of jobs</a>.
               </p>
+              <Restore id={id} />
             </Empty>
           </section>
         ) : (
@@ -133,6 +135,19 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
         <Sections live={live} job={job} part={part} detail={detail} gain={gain} />
       )}
     </div>
+  )
+}
+
+/** A job is restored until 24 hours after its deletion. */
+function Restore({ id }: { id: string }) {
+  const [error, setError] = useState<unknown>(null)
+  return (
+    <>
+      <button type="button" onClick={() => restoreJob(id).then(() => location.reload(), setError)}>
+        Restore the deleted job
+      </button>
+      {error !== null && <ErrorNotice what="Could not restore the job." error={error} />}
+    </>
   )
 }
 

@@ -2,20 +2,11 @@
 
 import { useState } from 'preact/hooks'
 import { get, patch, remove } from '../api/client'
-import type { JobSummary } from '../api/types'
-import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { idsOf } from '../router/query-value'
 import { comparePath, jobPath } from '../router/routes'
-import {
-  type Deletion,
-  type DeletionPreview,
-  deleteAll,
-  deletionPreview,
-  inTurn,
-  lostWith,
-} from './deletion'
+import { changeAll, DELETED, type Refused, restoreJob } from './deletion'
 import { type ListQuery, MOST_COMPARED } from './list-query'
 
 const KEY = 'gaitswarm.selected'
@@ -55,30 +46,17 @@ interface SelectionProps {
 
 export function Selection({ selected, query, more, onDone, onSelect }: SelectionProps) {
   const [error, setError] = useState<unknown>(null)
-  const [preview, setPreview] = useState<DeletionPreview | null>(null)
-  const [deletion, setDeletion] = useState<Deletion | null>(null)
-  const [moved, setMoved] = useState<{ ids: readonly string[]; archived: boolean } | null>(null)
+  const [done, setDone] = useState<Done | null>(lastDeletion)
   const [busy, setBusy] = useState(false)
   const during = (work: Promise<void>) => {
     setError(null)
     setBusy(true)
     work.catch(setError).finally(() => setBusy(false))
   }
-  const archive = async (ids: readonly string[], archived: boolean) => {
-    await inTurn(ids, (id) =>
-      patch('/v1/jobs/{job_id}', { path: { job_id: id }, body: { archived } }),
-    )
-    onSelect([])
-    onDone()
-  }
-  const deleteJobs = async (jobs: readonly JobSummary[]) => {
-    setPreview(null)
-    const result = await deleteAll(jobs, (id) =>
-      remove('/v1/jobs/{job_id}', { path: { job_id: id } }),
-    )
-    setDeletion(result)
-    const deleted = new Set(result.deleted)
-    onSelect(selected.filter((id) => !deleted.has(id)))
+  const run = async (verb: Verb, ids: readonly string[]) => {
+    const { changed, refused } = await changeAll(ids, SEND[verb])
+    setDone({ verb, ids: changed, refused })
+    onSelect(selected.filter((id) => !changed.includes(id)))
     onDone()
   }
   return (
@@ -103,13 +81,7 @@ export function Selection({ selected, query, more, onDone, onSelect }: Selection
             type="button"
             class="compact"
             disabled={busy}
-            onClick={() =>
-              during(
-                archive(selected, !query.archived).then(() =>
-                  setMoved({ ids: selected, archived: !query.archived }),
-                ),
-              )
-            }
+            onClick={() => during(run(query.archived ? 'unarchived' : 'archived', selected))}
           >
             {query.archived ? 'Restore from archive' : 'Archive'}
           </button>
@@ -117,9 +89,10 @@ export function Selection({ selected, query, more, onDone, onSelect }: Selection
             type="button"
             class="compact danger"
             disabled={busy}
-            onClick={() => during(deletionPreview(selected).then(setPreview))}
+            title="Deleted jobs can be restored for 24 hours."
+            onClick={() => during(run('deleted', selected))}
           >
-            Delete…
+            Delete
           </button>
           <button type="button" class="compact" onClick={() => onSelect([])}>
             Clear selection
@@ -127,83 +100,72 @@ export function Selection({ selected, query, more, onDone, onSelect }: Selection
         </div>
       )}
       {error !== null && <ErrorNotice what="The command failed." error={error} />}
-      {moved && (
-        <div class="notice row" data-tone="good" role="status">
-          <span>
-            {jobsInWords(moved.ids.length)} {moved.archived ? 'archived' : 'restored'}.
-          </span>
-          <button
-            type="button"
-            class="compact"
-            disabled={busy}
-            onClick={() => during(archive(moved.ids, !moved.archived).then(() => setMoved(null)))}
-          >
-            Undo
-          </button>
-          <button type="button" class="compact plain" onClick={() => setMoved(null)}>
-            Close
-          </button>
+      {done && (
+        <div class="notice" data-tone={done.refused.length > 0 ? 'warn' : 'good'} role="status">
+          <div class="row">
+            <span>
+              {jobsInWords(done.ids.length)} {done.verb}
+              {done.refused.length > 0 && `; ${jobsInWords(done.refused.length)} not ${done.verb}`}.
+              {done.verb === 'deleted' && ' They can be restored for 24 hours.'}
+            </span>
+            {done.ids.length > 0 && UNDO[done.verb] && (
+              <button
+                type="button"
+                class="compact"
+                disabled={busy}
+                onClick={() => during(run(UNDO[done.verb]!, done.ids).then(() => setDone(null)))}
+              >
+                Undo
+              </button>
+            )}
+            <button type="button" class="compact plain" onClick={() => setDone(null)}>
+              Close
+            </button>
+          </div>
+          {done.refused.length > 0 && <Reasons items={done.refused} />}
         </div>
       )}
-      {deletion !== null && <DeletionNote deletion={deletion} onClose={() => setDeletion(null)} />}
-      {preview && (
-        <ConfirmDialog
-          title={`Delete ${jobsInWords(preview.deletable.length)} and their results?`}
-          confirm={`Delete ${jobsInWords(preview.deletable.length)}`}
-          dangerous
-          disabled={preview.deletable.length === 0}
-          onConfirm={() => during(deleteJobs(preview.deletable))}
-          onDismiss={() => setPreview(null)}
-        >
-          <PreviewNote preview={preview} />
-        </ConfirmDialog>
-      )}
     </>
   )
 }
 
-function PreviewNote({ preview }: { preview: DeletionPreview }) {
-  const lost = lostWith(preview.deletable)
-  return (
-    <>
-      {preview.deletable.length > 0 && (
-        <p>
-          {formatCount(lost.iterations)} iterations with {formatCount(lost.evaluations)} evaluated
-          designs are permanently lost. Forks of the jobs keep their copies but lose their parents;
-          certificates of their designs are separate jobs and remain.
-        </p>
-      )}
-      {preview.refused.length > 0 && (
-        <>
-          <p>{jobsInWords(preview.refused.length)} cannot be deleted:</p>
-          <Reasons items={preview.refused} />
-        </>
-      )}
-    </>
-  )
+interface Done {
+  readonly verb: Verb
+  readonly ids: readonly string[]
+  readonly refused: readonly Refused[]
 }
 
-function DeletionNote({ deletion, onClose }: { deletion: Deletion; onClose: () => void }) {
-  return (
-    <div class="notice" data-tone={deletion.refused.length > 0 ? 'warn' : 'good'} role="status">
-      <p>
-        {jobsInWords(deletion.deleted.length)} deleted
-        {deletion.refused.length > 0 && `; ${jobsInWords(deletion.refused.length)} not deleted`}.
-      </p>
-      {deletion.refused.length > 0 && <Reasons items={deletion.refused} />}
-      <button type="button" class="compact" onClick={onClose}>
-        Close
-      </button>
-    </div>
-  )
+type Verb = keyof typeof SEND
+
+const label = (archived: boolean) => (id: string) =>
+  patch('/v1/jobs/{job_id}', { path: { job_id: id }, body: { archived } })
+
+const SEND = {
+  archived: label(true),
+  unarchived: label(false),
+  deleted: (id: string) => remove('/v1/jobs/{job_id}', { path: { job_id: id } }),
+  restored: restoreJob,
 }
 
-function Reasons({ items }: { items: DeletionPreview['refused'] }) {
+const UNDO: Readonly<Partial<Record<Verb, Verb>>> = {
+  archived: 'unarchived',
+  unarchived: 'archived',
+  deleted: 'restored',
+}
+
+/** The job deleted on its own page just before, if one was. */
+function lastDeletion(): Done | null {
+  const ids = idsOf(sessionStorage.getItem(DELETED))
+  sessionStorage.removeItem(DELETED)
+  return ids.length > 0 ? { verb: 'deleted', ids, refused: [] } : null
+}
+
+function Reasons({ items }: { items: readonly Refused[] }) {
   return (
     <ul class="small reasons">
-      {items.map(({ id, name, reason }) => (
+      {items.map(({ id, reason }) => (
         <li key={id}>
-          <a href={jobPath(id)}>{name || id}</a>: {reason}
+          <a href={jobPath(id)}>{id}</a>: {reason}
         </li>
       ))}
     </ul>

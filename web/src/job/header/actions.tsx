@@ -9,11 +9,12 @@ import { ConfirmDialog } from '../../components/confirm-dialog'
 import { ErrorNotice } from '../../components/feedback'
 import { Menu, type MenuItem } from '../../components/menu'
 import { formatCount } from '../../format/number'
+import { DELETED } from '../../jobs/deletion'
 import { navigate } from '../../router/navigation'
 import { withQuery } from '../../router/routes'
 import { canFork, ExtendDialog, ForkDialog, LabelDialog, PriorityDialog } from './dialogs'
 
-type Dialog = 'cancel' | 'delete' | 'extend' | 'fork' | 'label' | 'priority' | null
+type Dialog = 'cancel' | 'extend' | 'fork' | 'label' | 'priority' | null
 
 interface JobActionsProps {
   job: StoredJob
@@ -43,6 +44,7 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
       onDeleting(false)
       throw problem
     }
+    sessionStorage.setItem(DELETED, job.id)
     navigate('/')
   }
   const path = { job_id: job.id }
@@ -70,7 +72,7 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
           onChoose: () => command(() => put(KEEP, { path })),
         },
     can('cancel') && { label: 'Cancel…', dangerous: true, onChoose: () => setDialog('cancel') },
-    can('delete') && { label: 'Delete…', dangerous: true, onChoose: () => setDialog('delete') },
+    can('delete') && { label: 'Delete', dangerous: true, onChoose: () => during(deleteJob()) },
   ]
   const main = (label: string, look: string, onClick: () => void) => (
     <button type="button" class={look} disabled={busy} onClick={onClick}>
@@ -103,21 +105,6 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
             A cancelled job cannot be resumed. The {formatCount(job.evaluations)} committed
             evaluations are kept; the current iteration is lost. To continue later, pause the job
             instead.
-          </p>
-        </ConfirmDialog>
-      )}
-      {dialog === 'delete' && (
-        <ConfirmDialog
-          title="Delete this job and its results?"
-          confirm="Delete the job"
-          dangerous
-          onConfirm={() => during(deleteJob())}
-          onDismiss={dialogProps.onDismiss}
-        >
-          <p>
-            {formatCount(job.evaluations)} evaluations in {formatCount(job.iterations)} iterations
-            are permanently lost. Forks of the job keep their copies but lose their parent;
-            certificates of its designs are separate jobs and remain.
           </p>
         </ConfirmDialog>
       )}

@@ -13,7 +13,7 @@ import { LineChart, type LineChartProps } from './lines/line-chart'
 
 interface ChartCardProps {
   title: string
-  note?: string
+  note?: ComponentChildren
   table: () => ComponentChildren
   data?: () => DataTable
   tools?: ComponentChildren

@@ -12,16 +12,40 @@ export function CopyBlock({ text, label }: { text: string; label: string }) {
   )
 }
 
-export function CopyButton({ text, label }: { text: string; label: string }) {
+/** The address of the view, which has all of its state. */
+export function CopyLink() {
+  return (
+    <CopyButton
+      text={() => location.href}
+      label="link"
+      caption="Copy link"
+      failed="Copy it from the address bar"
+    />
+  )
+}
+
+interface CopyButtonProps {
+  text: string | (() => string)
+  label: string
+  caption?: string
+  failed?: string
+}
+
+export function CopyButton({
+  text,
+  label,
+  caption = 'Copy',
+  failed = 'Select the text to copy it',
+}: CopyButtonProps) {
   const [status, setStatus] = useState('')
   const copy = async () => {
-    setStatus((await copied(text)) ? 'Copied' : 'Select the text to copy it')
+    setStatus((await copied(typeof text === 'string' ? text : text())) ? 'Copied' : failed)
     setTimeout(() => setStatus(''), 2500)
   }
   return (
     <>
       <button type="button" class="compact" onClick={copy} aria-label={`Copy ${label}`}>
-        {status === '' ? 'Copy' : status}
+        {status === '' ? caption : status}
       </button>
       <span class="visually-hidden" role="status">
         {status}

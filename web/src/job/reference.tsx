@@ -3,7 +3,14 @@
 import { get, post } from '../api/client'
 import { isPublished, jobSearch, NOT_PUBLISHED, readableJob } from '../api/jobs'
 import { cached, useResource } from '../api/resource'
-import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
+import type {
+  Controller,
+  Job,
+  JobSpec,
+  ReferenceView,
+  ScenarioResult,
+  Simulation,
+} from '../api/types'
 import { Combobox } from '../components/fields/combobox'
 import type { Design } from '../format/value'
 
@@ -13,7 +20,7 @@ export interface Reference {
 }
 
 /** The job's own reference as an address value; null if it has none. */
-export function ownReference({ kind, spec, reference }: Job): string | null {
+export function ownReference({ kind, spec }: Job, reference: ReferenceView | null): string | null {
   if (kind !== 'tuning' || !reference) return null
   if (reference.kind === 'start') return 'start'
   return `published:${(spec as JobSpec).controller}:${reference.name}`
@@ -83,18 +90,19 @@ function walkOf(
 
 interface ReferencePickerProps {
   job: Job
+  /** As an address value. */
+  own: string | null
   choice: string
   label: string | null
   onChoose: (choice: string) => void
 }
 
-export function ReferencePicker({ job, choice, label, onChoose }: ReferencePickerProps) {
+export function ReferencePicker({ job, own, choice, label, onChoose }: ReferencePickerProps) {
   const tuning = job.kind === 'tuning'
   const hasPublished = tuning && isPublished((job.spec as JobSpec).robot)
   const published = useResource(hasPublished ? 'controllers' : null, catalogue)
   const groups = [{ label: '', choices: [{ value: 'none', label: 'nothing' }] }]
-  if (ownReference(job) === 'start')
-    groups[0].choices.push({ value: 'start', label: 'start design' })
+  if (own === 'start') groups[0].choices.push({ value: 'start', label: 'start design' })
   if (hasPublished) groups.push({ label: 'Published designs', choices: designs(published.data) })
   const selected = groups.flatMap(({ choices }) => choices).find(({ value }) => value === choice)
   return (

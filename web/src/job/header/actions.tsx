@@ -6,6 +6,7 @@ import { isReadable } from '../../api/jobs'
 import { isOffline } from '../../api/problem'
 import type { StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
+import { CopyLink } from '../../components/copy-button'
 import { ErrorNotice } from '../../components/feedback'
 import { Menu, type MenuItem } from '../../components/menu'
 import { formatCount } from '../../format/number'
@@ -84,6 +85,7 @@ export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
       <div class="row">
         {can('pause') && main('Pause', '', () => command(() => post(PAUSE, { path })))}
         {can('resume') && main('Resume', 'primary', () => command(() => post(RESUME, { path })))}
+        <CopyLink />
         <Menu
           label="Actions"
           of={job.name || job.id}

@@ -10,6 +10,7 @@ import { type Band, LineChart, type Series } from '../../charts/lines/line-chart
 import { lineLabel, type ReferenceLine } from '../../charts/lines/reference-line'
 import { Empty } from '../../components/feedback'
 import { Check } from '../../components/fields/controls'
+import { Term } from '../../components/term'
 import { formatCount, formatNumber, withUnit } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
 import { navigate } from '../../router/navigation'
@@ -65,7 +66,12 @@ export function ConvergenceChart({
   return (
     <ChartCard
       title="Convergence"
-      note="Each dot is a design; lower is better. Click to open an iteration, drag to zoom."
+      note={
+        <>
+          Each dot is the <Term name="fitness" /> of a design; lower is better. Click to open an
+          iteration, drag to zoom.
+        </>
+      }
       tools={
         <>
           <Check label="bands" checked={bands} onChange={setBands} />

@@ -45,7 +45,9 @@ export function ResultPanel({ live, job, gain }: PanelProps) {
       <ConvergenceChart job={job} iterations={iterations} reference={gain.reference} />
       {job.best && (
         <>
-          {job.kind !== 'preferences' && <ScenariosPanel job={job} />}
+          {job.kind !== 'preferences' && (
+            <ScenariosPanel job={job} own={job.reference ?? gain.verdict?.reference ?? null} />
+          )}
           <WinnerCard job={job} />
           {job.spec.kind === 'tuning' && !job.spec.worlds && (
             <LimitsCard job={job} spec={job.spec} />

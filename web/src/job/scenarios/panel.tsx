@@ -2,10 +2,11 @@
 
 import { get } from '../../api/client'
 import { type Resource, useResource } from '../../api/resource'
-import type { Job, Preference, RecordingView, ScenarioResult } from '../../api/types'
+import type { Job, Preference, RecordingView, ReferenceView, ScenarioResult } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Card, EmptyCard, Loaded } from '../../components/card'
 import { type Column, Table } from '../../components/table/table'
+import { Term } from '../../components/term'
 import { change, formatNumber, quantity } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
@@ -26,9 +27,10 @@ interface Row {
   readonly otherUtility: number | null
 }
 
-export default function ScenariosPanel({ job }: { job: Job }) {
+/** own: the job's reference, if it is known. */
+export default function ScenariosPanel({ job, own }: { job: Job; own: ReferenceView | null }) {
   const { query } = usePlace()
-  const choice = query.get('against') ?? ownReference(job) ?? 'none'
+  const choice = query.get('against') ?? ownReference(job, own) ?? 'none'
   const reference = useReference(job, choice)
   const recordings = useRecordings(job)
   const words = caseWords(job.kind)
@@ -47,6 +49,7 @@ export default function ScenariosPanel({ job }: { job: Job }) {
       <div class="row spread">
         <ReferencePicker
           job={job}
+          own={ownReference(job, own)}
           choice={choice}
           label={label}
           onChoose={(against) => setQuery({ against })}
@@ -156,7 +159,16 @@ function UtilityCard({ job, rows, label }: UtilityCardProps) {
   return (
     <ChartCard
       title={title}
-      note={`${note}; lower is better. The ${item} with the longest bar limits the winner.`}
+      note={
+        <>
+          {measure === 'utility' && (
+            <>
+              The <Term name="utility" /> weighs the objectives by the <Term name="preference" />.{' '}
+            </>
+          )}
+          {note}; lower is better. The {item} with the longest bar limits the winner.
+        </>
+      }
       legend={
         <>
           <LegendEntry colour="--series-1" label="winner" area />

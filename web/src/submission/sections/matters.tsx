@@ -5,6 +5,7 @@ import { Card } from '../../components/card'
 import { NumberField, Segmented } from '../../components/fields/controls'
 import { Problems, TextField } from '../../components/fields/field'
 import { Table } from '../../components/table/table'
+import { Term } from '../../components/term'
 import { Unit } from '../../components/text'
 import { formatCount, percent } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
@@ -54,6 +55,12 @@ export function MattersSection({ draft, catalogue, errors, onChange }: SectionPr
       title={
         <>
           <b class="step">2</b> What matters
+        </>
+      }
+      note={
+        <>
+          The <Term name="preference" /> says how much objectives count; a limit is a{' '}
+          <Term name="constraint" />.
         </>
       }
     >

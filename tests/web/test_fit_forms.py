@@ -139,6 +139,41 @@ def test_a_calibration_has_targets_of_a_log_and_typed_ones(
     assert spec["walks"][0]["scenarios"][0]["cycles"] == 1.0
 
 
+def test_a_calibration_has_targets_of_a_table_without_a_log(
+    server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="422").go("/jobs/new?kind=calibration")
+    table = tmp_path / "targets.csv"
+    table.write_text(
+        "scenario,quantity,value,tolerance,use\n"
+        "normal-fast,speed,0.05,0.05\nnormal-fast,mean current,0.4,,predict\n"
+        "slope-fast,energy,90\n",
+        encoding="utf-8",
+    )
+    page.get_by_label("Table", exact=True).set_input_files(table)
+    typed = page.get_by_label("Targets, one per line")
+    expect(page.get_by_label("value of target 3")).to_have_value("90")
+    typed.press("End")
+    typed.press_sequentially("normal-slow")
+    expect(typed).to_have_accessible_description(re.compile("is not: scenario, quantity, value"))
+    typed.press_sequentially(", speed, 0.03")
+    expect(page.get_by_label("value of target 4")).to_have_value("0.03")
+    page.get_by_label("Particles").fill("4")
+    page.get_by_label("Iterations").fill("1")
+    expect(page.locator("[data-walks]")).to_be_visible()
+    spec = server.job(submitted(page))["spec"]
+    assert [walk["scenarios"][0]["name"] for walk in spec["walks"]] == [
+        *("normal-fast", "slope-fast", "normal-slow")
+    ]
+    assert [(t["walk"], t["quantity"], t["tolerance"], t["use"]) for t in spec["targets"]] == [
+        ("walk-1", "speed", 0.05, "fit"),
+        ("walk-1", "mean_current", 0.1, "predict"),
+        ("walk-2", "energy", 0.1, "fit"),
+        ("walk-3", "speed", 0.1, "fit"),
+    ]
+    assert spec["walks"][0]["design"] == PUBLISHED_A
+
+
 @pytest.mark.thorough("test_views_are_accessible_at_every_width")
 def test_targets_of_a_log_are_accessible_at_every_width(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]

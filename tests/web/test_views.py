@@ -30,10 +30,9 @@ RUN_AXE_IN_DIALOG = RUN_AXE.replace("axe.run(document", "axe.run('dialog[open]'"
 RULES_OF_COLOURS: Final = ("color-contrast", "link-in-text-block")
 """Rules that depend on colours; all others are checked in light colours only."""
 
-# In a tab list or radio group, Tab reaches the selected item and arrows the others.
 OUT_OF_REACH = """() => [
         ...document.querySelectorAll('a, button, input, select, textarea, summary')
-    ].filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex < 0 && e.role !== 'tab')
+    ].filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex < 0)
     .map((e) => e.outerHTML.slice(0, 120))"""
 
 CHARTS_WITHOUT_TABLE = """() => [...document.querySelectorAll('canvas')]

@@ -5,8 +5,8 @@ import { post } from '../api/client'
 import { useResource } from '../api/resource'
 import type { Variable } from '../api/types'
 import { Card, Loaded } from '../components/card'
+import { Segmented } from '../components/fields/controls'
 import { Table } from '../components/table/table'
-import { Tabs } from '../components/tabs'
 import { formatExact, quantity, writtenUnit } from '../format/number'
 import { formatExactValue } from '../format/value'
 import { inWords } from '../format/words'
@@ -96,24 +96,21 @@ function Outputs({ surface }: { surface: SurfaceView }) {
   const { outputs } = surface
   const [name, setName] = useState(outputs[0].name)
   const output = outputs.find((each) => each.name === name) ?? outputs[0]
-  const panel = <FuzzyPanel key={output.name} surface={surface} output={output} />
   return (
     <>
       {surface.velocity_error !== null && (
         <VelocityChoice surface={surface} velocity={surface.velocity_error} />
       )}
-      {outputs.length === 1 ? (
-        panel
-      ) : (
-        <Tabs
-          label="Outputs"
-          tabs={outputs.map((each) => ({ key: each.name, label: `${each.name} [${each.unit}]` }))}
-          selected={output.name}
+      {outputs.length > 1 && (
+        <Segmented
+          roomy
+          label="Output"
+          value={output.name}
+          options={outputs.map(({ name, unit }) => [name, `${name} [${unit}]`] as const)}
           onChoose={setName}
-        >
-          {panel}
-        </Tabs>
+        />
       )}
+      <FuzzyPanel key={output.name} surface={surface} output={output} />
     </>
   )
 }

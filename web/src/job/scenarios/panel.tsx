@@ -46,7 +46,7 @@ export default function ScenariosPanel({ job, own }: { job: Job; own: ReferenceV
   return (
     <div class="stack">
       {job.kind === 'identification' && <RecordingsCard recordings={recordings} />}
-      <div class="row spread">
+      <div class="row">
         <ReferencePicker
           job={job}
           own={ownReference(job, own)}
@@ -54,7 +54,6 @@ export default function ScenariosPanel({ job, own }: { job: Job; own: ReferenceV
           label={label}
           onChoose={(against) => setQuery({ against })}
         />
-        {label !== null && isRanked(job) && <Summary job={job} rows={rows} label={label} />}
       </div>
       <Loaded resource={reference} what="the reference" />
       <UtilityCard job={job} rows={rows} label={label} />
@@ -105,32 +104,6 @@ function rowsOf(
     const label = recording ? `${recording.scenario} (${scenario})` : scenario
     return { scenario, label, winner, other, utility: winner.utility, otherUtility }
   })
-}
-
-function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: string }) {
-  const words = caseWords(job.kind)
-  const both = rows.filter((row) => row.utility !== null && row.otherUtility !== null)
-  if (both.length === 0)
-    return (
-      <p>
-        {label} has no {words.item} in common with this job.
-      </p>
-    )
-  const fitness = (part: 'utility' | 'otherUtility') => {
-    const values = both.map((row) => row[part]!)
-    const mean = (terms: readonly number[]) => terms.reduce((a, b) => a + b, 0) / terms.length
-    // Geometric mean (eq. 4.2); arithmetic mean of an identification's errors.
-    return job.kind === 'tuning' ? Math.exp(mean(values.map(Math.log))) : mean(values)
-  }
-  const ratio = fitness('utility') / fitness('otherUtility')
-  const share = Math.abs(ratio - 1) * 100
-  return (
-    <p data-ratio={ratio}>
-      Over {both.length === rows.length ? 'all' : `the ${both.length} common`} {words.items}, the
-      winner is <strong>{formatNumber(share, 3)}&nbsp;%</strong> {ratio < 1 ? 'better' : 'worse'}{' '}
-      than {label}.
-    </p>
-  )
 }
 
 interface UtilityCardProps {

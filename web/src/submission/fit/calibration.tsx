@@ -1,7 +1,7 @@
 /** New-calibration form: parameters to fit to measured targets. */
 
 import { useMemo, useState } from 'preact/hooks'
-import type { Controller, RecordingView, Variable } from '../../api/types'
+import type { Controller, Variable } from '../../api/types'
 import { type Option, Select } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
 import { capitalized, inWords } from '../../format/words'
@@ -14,6 +14,7 @@ import {
   nextKey,
   selectedTargets,
   type TargetDraft,
+  type TargetWalk,
   walkName,
   withRecordings,
 } from './targets'
@@ -31,7 +32,7 @@ export function CalibrationForm({
   robot,
   fittable,
   recordings,
-}: FitProps & { recordings: readonly RecordingView[] }) {
+}: FitProps & { recordings: readonly TargetWalk[] }) {
   const [draft, setDraft] = useState<FitDraft>({
     ...EMPTY_FIT,
     name: 'calibration',
@@ -92,7 +93,7 @@ type Change = (targets: readonly TargetDraft[]) => readonly TargetDraft[]
 
 interface TargetsTableProps {
   catalogue: Catalogue
-  recordings: readonly RecordingView[]
+  recordings: readonly TargetWalk[]
   targets: readonly TargetDraft[]
   onChange: (change: Change) => void
 }

@@ -20,6 +20,8 @@ import { CalibrationForm } from './calibration'
 import { IdentificationForm } from './identification'
 import { idsIn, recordingSearch, shortId } from './recordings/recording-search'
 import { UploadCard } from './recordings/upload-card'
+import { TargetTable } from './target-table'
+import type { TableWalk } from './targets'
 
 export type FitKind = 'identification' | 'calibration'
 
@@ -74,6 +76,7 @@ function Fit({
   ids: readonly string[]
 }) {
   const [draft, setDraft] = useState(() => emptyDraft(catalogue))
+  const [walks, setWalks] = useState<readonly TableWalk[]>([])
   const robot = useMemo(() => robotOf(draft) as RobotSource, [draft.robot])
   const fittable = useFittableParameters(draft.robot, catalogue)
   // The previous ones stay while others load, so that typed values are kept.
@@ -103,8 +106,9 @@ function Fit({
       <RecordingsCard ids={ids} recordings={recordings} onChange={select} />
       {/* Without recordings, there is nothing to estimate. */}
       {ids.length > 0 && kind === 'identification' && <IdentificationForm {...parts} />}
-      {kind === 'calibration' && shown.length > 0 && (
-        <CalibrationForm {...parts} recordings={shown} />
+      {kind === 'calibration' && <TargetTable onWalks={setWalks} />}
+      {kind === 'calibration' && shown.length + walks.length > 0 && (
+        <CalibrationForm {...parts} recordings={[...shown, ...walks]} />
       )}
     </div>
   )

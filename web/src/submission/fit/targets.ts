@@ -14,8 +14,51 @@ export interface TargetDraft {
   readonly use: 'fit' | 'predict'
 }
 
-/** Currents of a log as targets; peaks contain noise and are only predicted. */
-function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[] {
+type Measured = Omit<TargetDraft, 'key' | 'recording'>
+
+/** A walk of which figures are known, but no log. */
+export interface TableWalk
+  extends Pick<RecordingView, 'id' | 'controller' | 'design' | 'scenario'> {
+  readonly walk: string
+  readonly targets: readonly Measured[]
+}
+
+export type TargetWalk = RecordingView | TableWalk
+
+/** Walks of a design by a table: scenario, quantity, value, and optionally tolerance and use. */
+export function tableWalks(text: string, design: Pick<TableWalk, 'controller' | 'design'>) {
+  const byScenario = new Map<string, Measured[]>()
+  let problem: string | undefined
+  for (const line of text.split('\n')) {
+    const cells = line.split(/[,;\t]/).map((cell) => cell.trim())
+    const [scenario, quantity = '', value = '', tolerance, use = 'fit'] = cells
+    if (line.trim() === '' || line.startsWith('#') || scenario === 'scenario') continue
+    if (cells.includes('controller')) {
+      const other = 'gaitswarm calibrate reads tables with designs of their own; this one has one'
+      return { walks: [], problem: `${other} design: scenario, quantity, value, tolerance, use` }
+    }
+    if (!value || (use !== 'fit' && use !== 'predict')) {
+      problem ??= `“${line.trim()}” is not: scenario, quantity, value, tolerance, fit or predict`
+      continue
+    }
+    const targets = byScenario.get(scenario) ?? []
+    byScenario.set(scenario, targets)
+    const name = quantity.replaceAll(' ', '_')
+    targets.push({ quantity: name, value, tolerance: tolerance || '0.1', use })
+  }
+  const walks = [...byScenario].map(([scenario, targets]): TableWalk => {
+    // Other targets are those of another walk, so that edited rows do not outlive them.
+    const id = `table ${scenario} ${JSON.stringify(targets)}`
+    return { ...design, id, scenario, walk: scenario, targets }
+  })
+  return { walks, problem }
+}
+
+/** Those of a table; or currents of a log, whose peaks contain noise and are only predicted. */
+function targetsOf(recording: TargetWalk, key: number): readonly TargetDraft[] {
+  if ('targets' in recording) {
+    return recording.targets.map((each, k) => ({ ...each, key: key + k, recording: recording.id }))
+  }
   const { id, mean_current, peak_current } = recording
   const value = (current: number) => String(Number(current.toPrecision(4)))
   const [mean, peak] = [value(mean_current), value(peak_current)]
@@ -35,7 +78,7 @@ function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[
 export function withRecordings(
   targets: readonly TargetDraft[],
   added: readonly string[],
-  recordings: readonly RecordingView[],
+  recordings: readonly TargetWalk[],
 ): readonly TargetDraft[] {
   const all = [...targets]
   for (const recording of recordings) {
@@ -58,7 +101,7 @@ export function calibrationSpec(
   parameters: Parameters,
   targets: readonly TargetDraft[],
   robot: RobotSource,
-  recordings: readonly RecordingView[],
+  recordings: readonly TargetWalk[],
   methods: readonly OptimizerPreset[],
 ): CalibrationSpec {
   const places = new Map(recordings.map(({ id }, index) => [id, walkName(index)]))
@@ -86,7 +129,7 @@ export function calibrationSpec(
 
 export function selectedTargets(
   targets: readonly TargetDraft[],
-  recordings: readonly RecordingView[],
+  recordings: readonly TargetWalk[],
 ): readonly TargetDraft[] {
   return targets.filter(({ recording }) => recordings.some(({ id }) => id === recording))
 }

@@ -12,8 +12,7 @@ const ZOOM = 1.15
 
 /** Elements that handle the keys themselves. */
 const SPACE_TARGETS = 'button, a, input, select, textarea, summary'
-const ARROW_TARGETS =
-  'input, select, textarea, [role="tab"], [role="application"][data-handles-keys]'
+const ARROW_TARGETS = 'input, select, textarea, [role="application"][data-handles-keys]'
 
 const CLOCK: Readonly<Record<string, (playback: Playback) => void>> = {
   ' ': (playback) => playback.toggle(),

@@ -29,12 +29,7 @@ _VALIDATIONS: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A part of the server's process that /v1/readyz reports.
-
-    Attributes:
-        trouble: Returns the current problem, or None.
-        vital: Whether a problem makes the server unready.
-    """
+    """A part of the server's process that /v1/readyz reports; a vital one makes it unready."""
 
     name: str
     trouble: Callable[[], str | None]
@@ -43,11 +38,7 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class ComputingCapacity:
-    """Limit of requests that compute at the same time. Bound to one event loop.
-
-    Attributes:
-        queue: Further requests that may wait.
-    """
+    """Limit of requests that compute at the same time. Bound to one event loop."""
 
     limiter: CapacityLimiter
     queue: int
@@ -63,11 +54,7 @@ class ComputingCapacity:
 
 
 class State(TypedDict):
-    """`request.state` of every request, as the lifespan of the application yields it.
-
-    draining: set by the server on the first signal, while it still answers. stopping: set when it
-    begins to stop, which ends event streams.
-    """
+    """`request.state` of every request, as the lifespan of the application yields it."""
 
     settings: Settings
     computing: ComputingCapacity

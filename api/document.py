@@ -1,7 +1,4 @@
-"""`python -m gaitswarm.api.document`: the OpenAPI document as JSON on stdout.
-
-The page's types are generated from it. Needs neither a server nor a database.
-"""
+"""`python -m gaitswarm.api.document`: the OpenAPI document as JSON, for the types of the page"""
 
 from __future__ import annotations
 

@@ -90,12 +90,7 @@ class EventsQuery(BaseModel):
 
 @dataclass(frozen=True)
 class News:
-    """A job and its next iterations, with events that are encoded once.
-
-    Attributes:
-        version: Version of the topic when the job was read.
-        iterations: In order; at most `PAGE`.
-    """
+    """A job and its next iterations as read at a topic's version, with events encoded once."""
 
     version: int
     job: Job
@@ -118,10 +113,7 @@ class News:
 
 
 class Topic:
-    """A job that streams follow. Bound to one event loop.
-
-    version: number of changes of the job noticed by this process.
-    """
+    """A job that streams follow, and a version of it for each change. Bound to one event loop."""
 
     def __init__(self, service: JobService, job_id: str, poll_seconds: float) -> None:
         self.version = 0

@@ -171,10 +171,7 @@ class OriginMiddleware:
 
 
 class BodyLimitMiddleware:
-    """Reject bodies over a limit, whether or not their length was declared.
-
-    larger: limits of single paths [B].
-    """
+    """Reject bodies over a limit, larger at some paths, with or without a declared length."""
 
     def __init__(self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int]) -> None:
         self.app = app

@@ -1,7 +1,4 @@
-"""The web page and the manual: static files, read on request.
-
-Files that are built while the server runs are served from then on.
-"""
+"""The web page and the manual: static files, read on request, also if they are built later."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Routes of the table of operations, most of them generic.
-
-A route by hand needs more than its operation: headers, or a stream.
-"""
+"""Routes of the table of operations, most of them generic; others need headers, or a stream."""
 
 from __future__ import annotations
 
@@ -132,10 +129,7 @@ _KIND: Final = inspect.Parameter.KEYWORD_ONLY
 
 
 def validated(model: Any, name: str) -> Callable[..., Any]:
-    """Return a dependency that reads the body of a request and validates it in a thread.
-
-    In the event loop, validation would delay every other request.
-    """
+    """Return a dependency that validates the body of a request in a thread, not in the loop."""
     adapter: TypeAdapter[Any] = TypeAdapter(model)
 
     async def read(http: Request, **body: Any) -> Any:

@@ -34,10 +34,7 @@ Drain = Callable[[threading.Event], None]
 
 
 class ApiServer:
-    """Server that listens from construction on and answers while `run` runs.
-
-    url: base URL, known before the first request even for port 0.
-    """
+    """Server that listens from construction on, also at port 0, and answers while `run` runs."""
 
     def __init__(
         self,

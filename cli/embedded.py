@@ -39,10 +39,7 @@ if TYPE_CHECKING:
 
 
 class Embedded:
-    """A database whose jobs run in this process, and workers opened when a job needs them.
-
-    accepts_changes: whether jobs may resume after changes of code, robot or compiler.
-    """
+    """A database whose jobs run in this process, and workers opened when a job needs them."""
 
     def __init__(self, workers: WorkerOptions, *, accepts_changes: bool = False) -> None:
         self._settings = read_settings(**asdict(workers))

@@ -14,12 +14,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 
 @contextmanager
 def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
-    """Open a binary file that replaces the path when the block succeeds.
-
-    The target of a link is replaced; devices and pipes are written to.
-
-    option: the option that named the path, for InvalidRequest if it cannot be written.
-    """
+    """Open a binary file that replaces the path, or a link's target, when the block succeeds."""
     try:
         special = path.exists() and not path.is_file()
         target = path.resolve()

@@ -269,10 +269,7 @@ def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, A
 def on_terrain(
     entries: Sequence[str | Mapping[str, Any] | Scenario], text: str
 ) -> list[dict[str, Any]]:
-    """Return scenarios on another terrain.
-
-    text: of --terrain.
-    """
+    """Return scenarios on another terrain, in the text of --terrain."""
     from gaitswarm.sim.scenario import Scenario, find_scenario
 
     terrain = _terrain(text)
@@ -351,12 +348,7 @@ _JOB: Final = "job:"
 
 @dataclass(frozen=True, slots=True)
 class GivenDesign:
-    """A design from a file, from the literature, or a job's best.
-
-    Attributes:
-        values: in the variables' units, by name; indices of choices for categorical variables.
-        spec: of the job whose best design it is; None for other designs.
-    """
+    """A design from a file, from the literature, or a job's best, with numbers for choices."""
 
     label: str
     controller: ControllerName
@@ -429,10 +421,9 @@ def _best_of_job(job_id: str, controller: str | None, place: Place) -> GivenDesi
 def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
     """Read values by name, with indices of choices; numbers are not checked yet.
 
-    design: a JSON object {name: value}, or one with it under `design`, as printed by
-        `best --json`; a file of it; or `published:NAME`.
-    trajectory: a file of gait parameters; they replace those of a published design, but must not
-        repeat those of a design file.
+    design: a JSON object {name: value}, or one with it under `design`; a file of it; or
+    `published:NAME`. trajectory: a file of gait parameters, which replace those of a published
+    design only.
     """
     law, is_published = CONTROLLERS[_controller_name(controller)], design.startswith(_PUBLISHED)
     if is_published:

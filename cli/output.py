@@ -108,10 +108,7 @@ def warnings_as_notes() -> None:
 
 
 class Stdout:
-    """Standard output whose failures are distinct from those of other files.
-
-    Methods raise OutputFailed or OutputClosed.
-    """
+    """Standard output that raises OutputFailed or OutputClosed, unlike other files."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

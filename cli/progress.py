@@ -25,14 +25,7 @@ _LINE_SECONDS: Final = 2.0
 
 @dataclass(slots=True)
 class Progress:
-    """Display of committed iterations.
-
-    Attributes:
-        particles: maximum of designs per iteration.
-        iterations, evaluations: already committed.
-        least_violation: of the constraints so far; None without any.
-        bar: on a terminal.
-    """
+    """Display of committed iterations, as a bar on a terminal."""
 
     particles: int
     iterations_planned: int

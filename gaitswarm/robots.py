@@ -69,12 +69,9 @@ DEFAULT_PREFERENCE: Final[PreferenceName] = "A"
 
 @dataclass(frozen=True, slots=True)
 class RobotDefaults:
-    """Of a robot: what its folder says, and what a spec has where it says nothing.
+    """Of a robot: what its folder says, and what a spec has where it says nothing."""
 
-    Attributes:
-        document: Fields of a spec that the folder gives, unchecked; none for a shipped robot.
-    """
-
+    # fields of a spec that the folder gives, unchecked; none for a shipped robot
     document: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -120,8 +120,7 @@ def simulate(
 def without_logs(view: SimulationView, path: Path | None) -> dict[str, Any]:
     """Write the logs of a simulation if there is a path; return the rest as JSON.
 
-    The NumPy archive has one array per quantity: 500 Hz, float64, NaN where undefined. Names are
-    those of `gaitswarm.sim.kernel.observation.WalkLog`; with several scenarios,
+    The NumPy archive has one array per quantity, as named in `WalkLog`; with several scenarios,
     `<scenario>/<name>`.
     """
     if path is not None:

@@ -99,41 +99,27 @@ class MeasuredLog:
     """A log with the quantities of table 2.2, measured, simulated or synthetic; T rows.
 
     Raises SimulationInputError if shapes do not match.
-
-    Attributes:
-        joints: J names in the robot's order, three joints per leg.
-        legs: L names in the robot's order.
-        time: from any start, one row per 2 ms, (T,) [s].
-        desired_angle: (T, J) [rad].
-        control_voltage: (T, J) [V]; None of torque-controlled robots.
-        joint_angle: (T, J) [rad].
-        current: absolute, (T, J) [A].
-        supply: (T, L) [V]; None if not measured, of torque-controlled robots.
-        potentiometer_joints: names of the K joints with a potentiometer.
-        potentiometer: (T, K) [rad]; None if K is 0.
-        body_acceleration: in the body's frame, without gravity, (T, 3) [g]; None if not measured.
-        body_rate: in the body's frame, (T, 3) [rad/s]; None if not measured.
-        battery_current: discharging is positive, (T, 1) [A]; None if not measured.
-        torque: of torque-controlled actuators, at the joint, signed, before friction, (T, J) [N m];
-            None if not measured.
-        metadata: of the file, by name.
     """
 
-    joints: tuple[str, ...]
-    legs: tuple[str, ...]
-    time: Floats
-    desired_angle: Floats
-    control_voltage: Floats | None
-    joint_angle: Floats
-    current: Floats
-    supply: Floats | None
-    potentiometer_joints: tuple[str, ...] = ()
-    potentiometer: Floats | None = None
+    joints: tuple[str, ...]  # J names in the robot's order, three joints per leg
+    legs: tuple[str, ...]  # L names in the robot's order
+    time: Floats  # from any start, one row per 2 ms, (T,) [s]
+    desired_angle: Floats  # (T, J) [rad]
+    control_voltage: Floats | None  # (T, J) [V]; None of torque-controlled robots
+    joint_angle: Floats  # (T, J) [rad]
+    current: Floats  # absolute, (T, J) [A]
+    supply: Floats | None  # (T, L) [V]; None if not measured, of torque-controlled robots
+    potentiometer_joints: tuple[str, ...] = ()  # names of the K joints with a potentiometer
+    potentiometer: Floats | None = None  # (T, K) [rad]; None if K is 0
+    # in the body's frame, without gravity, (T, 3) [g]; None if not measured
     body_acceleration: Floats | None = None
-    body_rate: Floats | None = None
+    body_rate: Floats | None = None  # in the body's frame, (T, 3) [rad/s]; None if not measured
+    # discharging is positive, (T, 1) [A]; None if not measured
     battery_current: Floats | None = None
+    # of torque-controlled actuators, at the joint, signed, before friction, (T, J) [N m]; None if
+    # not measured
     torque: Floats | None = None
-    metadata: Mapping[str, str] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)  # of the file, by name
 
     def __post_init__(self) -> None:
         for quantity in Quantity:

@@ -17,24 +17,16 @@ from gaitswarm.sim.provenance import Provenance
 
 @dataclass(frozen=True, slots=True)
 class TaskReport:
-    """A task of a request, as run by a worker.
-
-    Attributes:
-        seconds: from the dispatch to the answer [s].
-        compute_seconds: computing time of the worker [s].
-        kernel_time: part of it in kernels, and the use of their lanes.
-        table_seconds: part of it for fuzzy tables [s].
-        host: name of the worker's machine; "" without an answer.
-        error: cause of failure, for people; None for a result.
-    """
+    """A task of a request, as run by a worker."""
 
     walks: int
-    seconds: float
-    compute_seconds: float = 0.0
-    host: str = ""
-    error: str | None = None
+    seconds: float  # from the dispatch to the answer [s]
+    compute_seconds: float = 0.0  # computing time of the worker [s]
+    host: str = ""  # name of the worker's machine; "" without an answer
+    error: str | None = None  # cause of failure, for people; None for a result
+    # part of it in kernels, and the use of their lanes
     kernel_time: KernelTime = field(default_factory=KernelTime)
-    table_seconds: float = 0.0
+    table_seconds: float = 0.0  # part of it for fuzzy tables [s]
 
 
 OnTask = Callable[[TaskReport], None]
@@ -45,26 +37,17 @@ OnOutcome = Callable[[int, int, Outcome], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationRequest:
-    """One iteration of one job: every design in every case.
+    """One iteration of one job: every design in every case."""
 
-    Attributes:
-        job_id: jobs share the workers by their weights.
-        designs: (n, v) float64.
-        provenance: of this process; the workers must match it.
-        on_task: called after every task; must return at once.
-        on_outcome: called for every case of a task with a result; must return at once, and not
-            modify the arrays.
-        weight: share of the workers relative to a job of weight 1.
-    """
-
-    job_id: str
+    job_id: str  # jobs share the workers by their weights
     cases: tuple[Case, ...]
-    designs: NDArray[np.float64]
-    provenance: Provenance
+    designs: NDArray[np.float64]  # (n, v) float64
+    provenance: Provenance  # of this process; the workers must match it
     iteration: int = 0
-    on_task: OnTask | None = None
+    on_task: OnTask | None = None  # called after every task; must return at once
+    # called for every case of a task with a result; must return at once, and not modify the arrays
     on_outcome: OnOutcome | None = None
-    weight: float = 1.0
+    weight: float = 1.0  # share of the workers relative to a job of weight 1
 
 
 class Evaluator(Protocol):

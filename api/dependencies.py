@@ -117,7 +117,6 @@ Stopping = Annotated[asyncio.Event, _state("stopping")]
 FollowedJobs = Annotated[Topics, _state("topics")]
 ServerMetrics = Annotated[Metrics, _state("metrics")]
 
-
 JobId = Annotated[JobIdText, Path(description="Id of the job, as POST /v1/jobs returned it.")]
 
 

@@ -333,7 +333,6 @@ IdempotencyKey = Annotated[
     ),
 ]
 
-
 NotifyUrl = Annotated[
     str | None,
     Header(

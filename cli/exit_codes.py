@@ -43,7 +43,6 @@ _SYSTEM_ERRORS: Final = frozenset(
 )
 """Refusals of the file system or operating system that no program can avoid."""
 
-
 _MEMORY: Final = re.compile(
     "failed to map segment|[Cc]annot allocate memory|can't start new thread|Unable to allocate"
 )

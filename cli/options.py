@@ -242,7 +242,6 @@ Precision = Annotated[
     ),
 ]
 
-
 TerrainOption = Annotated[
     str | None,
     typer.Option(

@@ -39,7 +39,6 @@ _CHANNELS: Final[dict[str, tuple[str, str]]] = {
 }
 """Arrays of a `Replay` in the order of a frame: unit and description."""
 
-
 MOST_POSES: Final = 1_000_000
 """Poses of links in a replay; one of 40 s at 500 Hz has half as many of a shipped robot."""
 

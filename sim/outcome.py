@@ -79,7 +79,6 @@ f6 has the opposite sign of table 4.1, whose loss of height is z(t_end) - z(0): 
 in every column. Preferences weigh its absolute value (eq. 3.1), so fitness ignores the sign.
 """
 
-
 MEASUREMENTS: Final[tuple[Objective, ...]] = (
     Objective("peak_current", "A", "largest absolute current of any motor at any physics step"),
     Objective("mean_current", "A", "mean over time and motors of the absolute current"),

@@ -18,7 +18,6 @@ from gaitswarm.sim.robot.shapes import VisibleLink, visible_links
 CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
 """Ticks of a log per second [Hz], the highest rate of a replay."""
 
-
 SAMPLED: Final = (
     "foot_force",
     "joint_angle",

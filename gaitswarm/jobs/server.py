@@ -48,7 +48,6 @@ BACKOFF: Final = Backoff(first=0.25, longest=10.0, attempts=4)
 RECONNECT: Final = Backoff(first=1.0, longest=1.0, attempts=30)
 """Default repetition of connections to an event stream; a restarted server is back by then."""
 
-
 _TRANSIENT: Final = (httpx2.NetworkError, httpx2.ConnectTimeout, httpx2.RemoteProtocolError)
 """The connection was not established, or broke."""
 

@@ -15,7 +15,6 @@ from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 _ON_THE_GROUND: Final = 0.1
 """Share of a foot's lift up to which it counts as on the ground: the filter rounds its path."""
 
-
 _LIFTED: Final = 1e-4
 """Height up to which no foot counts as lifted [m], for rounding errors of a standing robot."""
 

@@ -75,7 +75,6 @@ _CURVES: Final = {
     "cycloid": cycloid,
 }
 
-
 Limits = tuple[tuple[float, float], ...]
 
 _CACHE_SIZE: Final = 64

@@ -368,7 +368,6 @@ class _Terrain:
 
 _DOWN: Final = np.array([0.0, 0.0, -1.0])
 
-
 _NO_TORQUE: Final = np.zeros(3)
 
 

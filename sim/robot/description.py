@@ -96,7 +96,6 @@ class Sensors(Data):
 ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
 """Friction law of soles; see `gaitswarm.sim.kernel.dynamics.contact`."""
 
-
 PlannedSoles = Literal["nominal", "own"]
 """Sole lengths that a gait assumes: the robot's common one, or each leg's."""
 

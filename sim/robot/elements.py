@@ -142,7 +142,6 @@ def numbers_of(
 
 _KINDS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
-
 TURNS: Final = frozenset({"revolute", "continuous"})
 """Types of revolute joints."""
 

@@ -166,7 +166,6 @@ RobotSource = Annotated[
 ]
 """A robot in jobs and requests."""
 
-
 RobotChoice = str | RobotVariant | RobotFiles | Robot
 """A robot as an argument of the simulator."""
 

@@ -114,7 +114,6 @@ MOST_KNEES: Final = 5
 KNEE_DISTANCE: Final = 0.25
 """Share of the front's range by which two knees differ in at least one objective."""
 
-
 FRONT_DESIGNS: Final = 1000
 """Designs of a front that are listed by default."""
 

@@ -94,7 +94,6 @@ class JobState(StrEnum):
 ENDED: Final = frozenset(state for state in JobState if state.terminal)
 """States in which a job has ended."""
 
-
 DELETABLE: Final = ENDED | {JobState.PAUSED}
 """States in which no runner holds the job."""
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 JOURNAL_SECONDS: Final = 10.0
 """Iterations that take longer, as the previous one did or as this one does, are journaled [s]."""
 
-
 _log = logging.getLogger(__name__)
 
 

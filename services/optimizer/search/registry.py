@@ -119,7 +119,6 @@ class AutoSettings(SearchSettings):
 _LARGEST_DIMENSION: Final = 64
 """Variables up to which CMA-ES is chosen; its decomposition costs the cube of the dimension."""
 
-
 _FEW_EVALUATIONS: Final = 250
 """Budget up to which Bayesian optimization is chosen, whose first designs come one by one."""
 

@@ -138,7 +138,6 @@ else:
 GAIT_OF_CHAPTER_3: Final = ("cycle_time", "stride", "height", "duty_factor", "fir_ms")
 """Gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""
 
-
 _POSTURE: Final = ("hip_height", "radius")
 """Gait variables for which neither end of the bounds is easier to reach."""
 

@@ -166,37 +166,29 @@ class Registry(MutableMapping[str, T]):
         accept: Callable[[Plugin, object], T],
         elsewhere: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._kind: Kind = kind
-        self._built_in = dict(built_in)
+        self.kind: Final = kind
+        self.built_in = dict(built_in)
         self._elsewhere = elsewhere
         self._accept = accept
         self._loaded: dict[Plugin, T] = {}
         self._broken: dict[Plugin, str] = {}
 
-    @property
-    def kind(self) -> Kind:
-        return self._kind
-
-    @property
-    def built_in(self) -> Mapping[str, T]:
-        return self._built_in
-
     def __getitem__(self, name: str) -> T:
-        if name in self._built_in:
-            return self._built_in[name]
+        if name in self.built_in:
+            return self.built_in[name]
         for plugin in self.plugins():
             if plugin.name == name and self.problem(plugin) is None:
                 return self._loaded[plugin]
         raise KeyError(name)
 
     def __setitem__(self, name: str, thing: T) -> None:
-        self._built_in[name] = thing
+        self.built_in[name] = thing
 
     def __delitem__(self, name: str) -> None:
-        del self._built_in[name]
+        del self.built_in[name]
 
     def __iter__(self) -> Iterator[str]:
-        yield from self._built_in
+        yield from self.built_in
         yield from (p.name for p in self.plugins() if self.problem(p) is None)
 
     def __len__(self) -> int:
@@ -204,7 +196,7 @@ class Registry(MutableMapping[str, T]):
 
     def plugins(self) -> tuple[Plugin, ...]:
         """Installed entry points of this kind, including unusable ones."""
-        return tuple(plugin for plugin in find_plugins() if plugin.kind == self._kind)
+        return tuple(plugin for plugin in find_plugins() if plugin.kind == self.kind)
 
     def problem(self, plugin: Plugin) -> str | None:
         """Return why a plug-in cannot be used; the first call imports it."""
@@ -218,14 +210,14 @@ class Registry(MutableMapping[str, T]):
         return self._broken.get(plugin)
 
     def distribution(self, name: str) -> tuple[str, ...]:
-        if name in self._built_in:
+        if name in self.built_in:
             return ()
         return tuple(
             p.distribution for p in self.plugins() if p.name == name and self.problem(p) is None
         )
 
     def unknown(self, name: str) -> str:
-        return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
+        return f"unknown {self.kind} {name!r}; {self.instead_of(name, self)}"
 
     def instead_of(self, name: str, known: Iterable[str]) -> str:
         if name in self._elsewhere and not any(p.name == name for p in self.plugins()):
@@ -238,7 +230,7 @@ class Registry(MutableMapping[str, T]):
         return "; ".join([instead_of(name, known), *reasons])
 
     def _check_name(self, plugin: Plugin) -> None:
-        if plugin.name in self._built_in:
+        if plugin.name in self.built_in:
             raise PluginError(f"{plugin} is ignored: gaitswarm itself uses the name")
         others = [o for o in self.plugins() if o.name == plugin.name and o != plugin]
         if others:

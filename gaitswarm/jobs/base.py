@@ -191,6 +191,7 @@ class Jobs(ABC):
     Thread-safe. A context manager: leaving the block closes it.
     """
 
+    _url: str
     _service: JobService
     """Only where operations are computed in this process."""
 
@@ -217,9 +218,9 @@ class Jobs(ABC):
         return decode(content)
 
     @property
-    @abstractmethod
     def url(self) -> str:
         """URL of the server, or file or URL of the database."""
+        return self._url
 
     @property
     @abstractmethod

@@ -55,11 +55,6 @@ class DatabaseJobs(Jobs):
         self._poll_seconds = poll_seconds
 
     @property
-    def url(self) -> str:
-        """The database's file name or URL."""
-        return self._url
-
-    @property
     def place(self) -> str:
         """Options by which a command reaches the same jobs; none for the default database."""
         if self._url == str(default_database()):

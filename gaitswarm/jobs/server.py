@@ -96,11 +96,6 @@ class ServerJobs(Jobs):
         )
 
     @property
-    def url(self) -> str:
-        """The server's URL."""
-        return self._url
-
-    @property
     def place(self) -> str:
         """Options by which a command reaches the same jobs."""
         return f" --server {masked_url(self._url)}"

@@ -149,11 +149,7 @@ class Aggregation:
         return Judgement(geometric_mean(self.aggregated(log_utilities)), log_utilities)
 
     def aggregated(self, log_utilities: Floats) -> Floats:
-        """Return (n, S) logarithms whose mean is that of the fitness.
-
-        Args:
-            log_utilities: (n, K), worlds varying fastest, +inf after a failure.
-        """
+        """Return (n, S) logarithms of which the fitness is the mean, from (n, K) by world."""
         logarithms = log_utilities
         if self.worlds is not None:
             logarithms = self.worlds.aggregated(logarithms)

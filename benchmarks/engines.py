@@ -1,6 +1,6 @@
 """The same robot in three engines: our compiled kernel, MuJoCo's rollout, Pinocchio's ABA.
 
-    python -m benchmarks.engines [--rounds 5] [--json]
+    python -m benchmarks.engines [--rounds 5] [--mjx] [--json]
 
 One thread each, and each at the physics rate of our kernel; MuJoCo also at higher ones, since its
 semi-implicit Euler needs shorter steps to be as exact. Under the same forces its worst objective is
@@ -15,6 +15,11 @@ What they compute is not the same either, and each row says it: the kernel walks
 battery, ground and objectives; MuJoCo rolls out logged motor voltages, with its own contacts or in
 free flight; Pinocchio computes accelerations only. MuJoCo and Pinocchio step one robot at a time,
 so that on one core both figures are the same.
+
+In one row the motors are MuJoCo's as well, its `dcmotor` with resistance, inductance, back-EMF and
+friction: an independent implementation, which must draw the energy of ours within 1 %. `--mjx` adds
+MuJoCo's steps in JAX (`pip install mujoco-mjx`; minutes to compile), with all cores and in single
+precision.
 """
 
 from __future__ import annotations
@@ -22,10 +27,13 @@ from __future__ import annotations
 import argparse
 import json
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -39,8 +47,8 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.native import load_kernel
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.mujoco.mjcf import Surroundings
-from gaitswarm.sim.mujoco.model import Feet, even_drags, model
+from gaitswarm.sim.mujoco.mjcf import Rig, Surroundings, mjcf
+from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import simulate
@@ -52,6 +60,8 @@ MUJOCO_RATES: Final = (PHYSICS_RATE, 2 * PHYSICS_RATE, 4 * PHYSICS_RATE)
 """Steps a second [Hz] of MuJoCo with its own contacts."""
 WALKERS: Final = 64
 """Walks at once: lanes of every kernel are full."""
+MJX_TICKS: Final = 20
+"""Control ticks of a walk in MJX."""
 
 
 def stiff_walk() -> WalkLog:
@@ -62,19 +72,38 @@ def stiff_walk() -> WalkLog:
     return log
 
 
-def mujoco_rollout(log: WalkLog, *, contacts: bool, rate: int) -> Callable[[], float]:
-    """A whole walk in `mujoco.rollout`, motors as affine actuators; us a step."""
+def mujoco_walk(
+    log: WalkLog, *, contacts: bool, rate: int, dc_motors: bool = False
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The robot at the walk's start, with motors as affine actuators or as MuJoCo's `dcmotor`."""
     robot = load_robot(ROBOT)
-    standing = SCENARIO.duty_factor * len(robot.legs)
-    drags = even_drags(robot, Surroundings.of(robot, SCENARIO), standing)
-    feet = Feet(drags) if contacts else None
-    substeps = round(CONTROL_PERIOD * rate)
-    m = model(robot, scenario=SCENARIO, timestep=1.0 / rate, feet=feet, voltage_motors=True)
+    surroundings = Surroundings.of(robot, SCENARIO)
+    rig = Rig(timestep=1.0 / rate, voltage_motors=True)
+    if contacts:
+        drags = even_drags(robot, surroundings, SCENARIO.duty_factor * len(robot.legs))
+        rig = with_contacts(robot, surroundings, rig, Feet(drags))
+    spec, a = mujoco.MjSpec.from_string(mjcf(robot, surroundings, rig)), robot.actuators()
+    if dc_motors:
+        numbers = (robot.joint_names, a.torque, a.resistance, a.inductance, a.viscous)
+        for motor, joint, k, r, inductance, friction in zip(spec.actuators, *numbers, strict=True):
+            motor.gainprm[:], motor.biasprm[:] = 0.0, 0.0
+            motor.set_to_dcmotor([k, k], r, inductance=[inductance, 0.0])
+            spec.joint(joint).damping[0] = friction
+    m = spec.compile()
     m.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     d = mujoco.MjData(m)
     d.qpos[:] = np.concatenate(
         [log.base_position[0], log.base_orientation[0, [3, 0, 1, 2]], log.joint_angle[0]]
     )
+    return m, d
+
+
+def mujoco_rollout(
+    log: WalkLog, *, contacts: bool, rate: int, dc_motors: bool = False
+) -> Callable[[], float]:
+    """A whole walk in `mujoco.rollout`; us a step."""
+    m, d = mujoco_walk(log, contacts=contacts, rate=rate, dc_motors=dc_motors)
+    substeps = round(CONTROL_PERIOD * rate)
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     start = np.empty((1, mujoco.mj_stateSize(m, kind)))
     mujoco.mj_getState(m, d, start[0], kind)
@@ -90,7 +119,36 @@ def mujoco_rollout(log: WalkLog, *, contacts: bool, rate: int) -> Callable[[], f
         walked = float(states[0, -1, 1] - log.base_position[0, 0])
         if contacts:
             assert walked > 0.8 * (log.base_position[-1, 0] - log.base_position[0, 0])
+        if dc_motors:
+            currents = states[0, :, -m.na :]
+            energy, ours = (voltage[0] * currents).sum() / rate, (log.voltage * log.current).sum()
+            assert abs(energy / (ours * CONTROL_PERIOD) - 1.0) < 0.01
         return elapsed / len(log.time) / substeps * 1e6
+
+    return run
+
+
+def mjx_steps(log: WalkLog) -> Callable[[], float]:
+    """The beginning of the walk in MJX, with its own contacts; us a step and walker."""
+    jax, mjx = import_module("jax"), import_module("mujoco.mjx")
+    m, d = mujoco_walk(log, contacts=True, rate=PHYSICS_RATE)
+    here, begun = mjx.put_model(m), mjx.put_data(m, d)
+    substeps = round(CONTROL_PERIOD * PHYSICS_RATE)
+    voltage = np.repeat(log.voltage[:MJX_TICKS], substeps, axis=0)
+
+    def walk(start: Any) -> Any:
+        def step(data: Any, ctrl: Any) -> tuple[Any, None]:
+            return mjx.step(here, data.replace(ctrl=ctrl)), None
+
+        return jax.lax.scan(step, begun.replace(qpos=start), voltage)[0].qpos
+
+    walks, starts = jax.jit(jax.vmap(walk)), jax.numpy.tile(begun.qpos, (WALKERS, 1))
+    walks(starts).block_until_ready()
+
+    def run() -> float:
+        before = time.perf_counter()
+        walks(starts).block_until_ready()
+        return (time.perf_counter() - before) / (WALKERS * len(voltage)) * 1e6
 
     return run
 
@@ -126,7 +184,7 @@ def kernel(precision: Precision, wanted: Target | None, walkers: int) -> Callabl
     return run
 
 
-def contestants() -> list[Contestant]:
+def contestants_here(*, mjx: bool) -> list[Contestant]:
     """All that this machine can run; the first is what ratios are of."""
     log = stiff_walk()
     walk = "whole walks: control, motors, ground, objectives"
@@ -155,8 +213,18 @@ def contestants() -> list[Contestant]:
         )
         for name, contacts, rate in [*ways, ("free flight", False, PHYSICS_RATE)]
     ]
+    motors = Contestant(
+        f"mujoco.rollout, dcmotor, {PHYSICS_RATE / 1e3:g} kHz",
+        "both",
+        "dynamics and motors under logged voltages, its own contacts",
+        mujoco_rollout(log, contacts=True, rate=PHYSICS_RATE, dc_motors=True),
+    )
     aba = Contestant("pinocchio.aba, from Python", "both", "accelerations only", pinocchio_aba())
-    return [*kernels, *rollouts, aba]
+    contestants = [*kernels, *rollouts, motors, aba]
+    if mjx:
+        steps = "dynamics under logged voltages, its own contacts, single precision"
+        contestants.append(Contestant("mjx on the CPU", "throughput", steps, mjx_steps(log)))
+    return contestants
 
 
 def main() -> None:
@@ -164,8 +232,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--mjx", action="store_true", help="also time MuJoCo in JAX")
     options = parser.parse_args()
-    runs = contestants()
+    mjx = options.mjx and find_spec("mujoco.mjx") is not None
+    if options.mjx and not mjx:
+        print("MJX is left out: pip install mujoco-mjx", file=sys.stderr)
+    runs = contestants_here(mjx=mjx)
     seen: dict[int, list[float]] = {k: [] for k in range(len(runs))}
     for _ in range(options.rounds):
         for k, contestant in enumerate(runs):

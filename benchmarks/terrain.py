@@ -3,7 +3,8 @@
     python -m benchmarks.terrain [--engines mujoco mujoco-contacts] [--json]
 
 The second design is that of the second job of `make demo`: controller and gait, no worse than
-published A in any objective of any scenario, on flat ground. Both walk `normal-fast`.
+published A in any objective of any scenario, on flat ground. Both walk `normal-fast`. The table has
+our objectives and, in brackets, how far those of MuJoCo are from them.
 """
 
 from __future__ import annotations
@@ -69,28 +70,28 @@ def main() -> None:
     parser.add_argument("--engines", nargs="*", default=["mujoco"], metavar="ENGINE")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
+    engines = ("gaitswarm", *options.engines)
     published = gaitswarm.CONTROLLERS["fuzzy-pi"].published["A"]
     designs = {"published A": published, "constrained": constrained_optimum()}
     rows = [
-        {"design": name, "ground": ground, "engine": engine} | {"objectives": found}
+        {"design": name, "ground": ground}
+        | {e: walked(design_numbers("fuzzy-pi", design), terrain, e) for e in engines}
         for name, design in designs.items()
         for ground, terrain in GROUNDS.items()
-        for engine in ("gaitswarm", *options.engines)
-        for found in [walked(design_numbers("fuzzy-pi", design), terrain, engine)]
     ]
     if options.json:
         print(json.dumps(rows, indent=2))
         return
-    print("| design | ground | engine |", " | ".join(o.name for o in OBJECTIVES[:COMPARED]), "|")
-    print("| --- " * (3 + COMPARED) + "|")
-    ours = np.full(COMPARED, np.nan)
+    print("| design | ground |", " | ".join(o.name for o in OBJECTIVES[:COMPARED]), "|")
+    print("| --- " * (2 + COMPARED) + "|")
     for row in rows:
-        found = np.array(row["objectives"])
-        if row["engine"] == "gaitswarm":
-            ours, cells = found, [f"{value:.3g}" for value in found]
-        else:
-            cells = [f"{value:+.1f} %" for value in 100.0 * (found / ours - 1.0)]
-        print(f"| {row['design']} | {row['ground']} | {row['engine']} |", " | ".join(cells), "|")
+        ours, *others = (np.array(row[engine]) for engine in engines)
+        apart = np.array([100.0 * (found / ours - 1.0) for found in others]).reshape(-1, COMPARED)
+        cells = [
+            f"{value:.2f} ({', '.join(f'{x:+.1f} %' for x in column)})"
+            for value, column in zip(ours, apart.T, strict=True)
+        ]
+        print(f"| {row['design']} | {row['ground']} |", " | ".join(cells), "|")
 
 
 if __name__ == "__main__":

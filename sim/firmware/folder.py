@@ -436,6 +436,11 @@ def check_drives_by_pwm(robot: RobotChoice) -> None:
             f"firmware outputs the PWM of DC motors; {machine.description.name} has"
             " torque-controlled actuators, which take torques or a joint PD's gains"
         )
+    if machine.servos is not None:
+        raise SimulationInputError(
+            f"{machine.description.name} has servos, which run their own firmware; export their"
+            " angles by `gaitswarm trajectories`"
+        )
 
 
 def check_table_bits(controller: ControllerName, bits: tuple[int, int]) -> None:

@@ -293,7 +293,7 @@ NO_JOINT_PD: Final = (
 )
 
 NO_SERVO: Final = (
-    "controller: servo commands angles to servos, and this robot has none; choose another"
+    "the controller servo commands angles to servos, and this robot has none; choose another"
     " controller, or give the actuators of robot.toml a table servo"
 )
 

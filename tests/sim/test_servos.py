@@ -13,6 +13,7 @@ import pytest
 
 from gaitswarm.sim.controllers import ControlLaw
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
+from gaitswarm.sim.firmware.folder import check_drives_by_pwm
 from gaitswarm.sim.kernel.control_tick import InnerLoop
 from gaitswarm.sim.kernel.dynamics.drives import DryFriction
 from gaitswarm.sim.kernel.parameters import DRY_FRICTION
@@ -25,7 +26,7 @@ from gaitswarm.sim.robot.library import listed_actuator
 from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.simulate import check_drives, simulate
 from tests.examples.pendulum import TRAJECTORIES, Pendulum, bench, swing, times
-from tests.examples.walks import short_walk, walk
+from tests.examples.walks import servo_quadruped_files, short_walk, walk
 from tests.robots.test_proposal import dog
 
 FRICTIONS = [
@@ -157,6 +158,11 @@ def test_the_controller_needs_servos() -> None:
         check_drives(ControlLaw(servo=32.0), "szabadka2")
     with pytest.raises(SimulationInputError, match="servo commands angles to servos"):
         simulate(short_walk(), "servo", ["P"], np.array([[32.0]]))
+
+
+def test_firmware_is_not_for_servos() -> None:
+    with pytest.raises(SimulationInputError, match="export their angles by"):
+        check_drives_by_pwm(servo_quadruped_files())
 
 
 @pytest.mark.parametrize(

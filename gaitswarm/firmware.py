@@ -207,8 +207,7 @@ def write_firmware(
     sensor readings and compares its outputs with the simulated ones, sample by sample.
 
     Args:
-        design: Value of each of the controller's variables, and of any gait variable, in their
-            units.
+        design: Values of the controller's variables, and of any gait variables, in their units.
         output: New or empty folder, which is written as a whole or not at all.
         scenarios: One scenario or several, whose trajectories are written and whose walks are
             repeated: names or numbers of presets, or `Scenario`.

@@ -110,14 +110,12 @@ def optimize(
     `optimize(resume=...)` continues to the same bits as if it had never stopped.
 
     Args:
-        spec: A `JobSpec`, `IdentificationSpec`, or a document as in docs/api.md; None
-            for the defaults, those of the thesis's chapter 4.
-        resume: Identifier of an earlier job to resume. A spec or options that are
-            given as well must be the job's own.
+        spec: A `JobSpec`, `IdentificationSpec` or document (docs/api.md); None: thesis chapter 4.
+        resume: Identifier of a job to resume; a spec or options, if given, must be its own.
         reuse: Whether to take the job of the same name and specification that the same code ran
             before, or to resume it if it has not ended, in place of a new job.
-        accept_changes: Whether to continue a job although its provenance (code,
-            robot, compiler) has changed; the change is recorded with it.
+        accept_changes: Whether to resume under a changed provenance (code, robot, compiler), which
+            is recorded with the job.
         db: Database to keep the job in: a file, or a URL as for `gaitswarm.open`. None: that of
             the environment (GAITSWARM_DB), else the user's own.
         evaluator: "in-process": threads of this process; "ray": Ray; "auto": Ray at
@@ -133,12 +131,10 @@ def optimize(
         The finished job with its best design and history.
 
     Raises:
-        InvalidRequest: The job is invalid or cannot be simulated; names the field. Nothing is
-            stored then.
+        InvalidRequest: The job is invalid or cannot be simulated, and not stored; names the field.
         NotFound: The job to resume does not exist.
         Conflict: The job to resume has another spec, or was cancelled.
-        ProvenanceChanged: The provenance of the job to resume has changed, which is
-            not accepted.
+        ProvenanceChanged: That of the job to resume has changed, which is not accepted.
         JobEnded: The job failed, or was paused or cancelled by another client.
         Interrupted: Ctrl-C; a KeyboardInterrupt that says how to resume.
         Unavailable: The database or the workers cannot be used.

@@ -312,9 +312,7 @@ def init_robot(
     mass: float | None = None,
     actuators: Mapping[str, str] = MappingProxyType({}),
 ) -> MadeRobot:
-    """Make a robot's folder from a URDF, xacro or MJCF file.
-
-    Legs, stance, actuators and two walks are chosen.
+    """Make a robot's folder from URDF, xacro or MJCF; choose legs, stance, actuators and two walks.
 
     The meshes that the URDF names are copied, so that the folder can be shown wherever it goes.
     What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.

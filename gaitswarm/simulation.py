@@ -336,8 +336,7 @@ def simulate(
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder that holds robot.toml and
             robot.urdf of another.
-        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-            `Preference`.
+        preference: How objectives are weighed: A, B, C (table 4.5), `chapter-3` or `Preference`.
         precision: Of the physics' numbers: "double", or "single", which is about twice as fast and
             needs the compiled kernel.
         world: Perturbations of the model, as `values` of a certificate's worlds: numbers by
@@ -515,8 +514,7 @@ def robustness(
     smooth.
 
     Args:
-        design: Value of each of the controller's variables, and of any gait variable, in the
-            variables' units.
+        design: Values of the controller's variables, and of any gait variables, in their units.
         scenarios: One scenario or several: names or numbers of presets, or `Scenario`.
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.

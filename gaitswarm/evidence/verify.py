@@ -182,8 +182,7 @@ def verify(
 
     Raises:
         NotFound: The file does not exist.
-        InvalidRequest: The file cannot be opened, `replay` or `seed` is negative, or `head` is no
-            digest.
+        InvalidRequest: The file cannot be opened, or `replay`, `seed` or `head` is invalid.
         EvaluatorUnavailable: Simulations cannot be run here.
     """
     for name, value in (("replay", replay), ("seed", seed or 0)):

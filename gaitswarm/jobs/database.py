@@ -149,8 +149,7 @@ class DatabaseJobs(Jobs):
             accept_changes: Whether the job continues although its provenance (code, robot,
                 compiler) has changed; the change is recorded with it.
             on_iteration: Called after each iteration is committed.
-            stop: When another thread sets it, the job is returned to the queue and the method
-                returns.
+            stop: When it is set, the job is returned to the queue and the method returns.
 
         Returns:
             The job as it is then: ended, paused, or queued if it was stopped.

@@ -9,6 +9,7 @@ from typing import Any, Final, cast
 
 from fastapi import FastAPI, Request, Response
 from fastapi.openapi.docs import get_swagger_ui_html
+from fastapi.responses import HTMLResponse
 from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
@@ -126,8 +127,8 @@ def add_documentation(app: FastAPI) -> None:
             swagger_css_url=f"{root}{ASSETS}/swagger-ui.css",
             swagger_favicon_url=f"{root}{ASSETS}/favicon.png",
         )
-        page.headers["Content-Security-Policy"] = policy_of(bytes(page.body))
-        return page
+        body = bytes(page.body).replace(b"<html>", b'<html lang="en">')
+        return HTMLResponse(body, headers={"Content-Security-Policy": policy_of(body)})
 
     app.add_route("/docs", documentation, include_in_schema=False)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -77,19 +78,41 @@ def test_the_stream_of_a_job_that_is_deleted_ends_with_that(
 
 
 def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
-    store: Store, spec: JobSpec
+    database: Path, spec: JobSpec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    old, young = (store.create_job(spec)[0] for _ in range(2))
-    store.command(old.id, Command.CANCEL)
-    # The times are the database's: the first is more than a tenth of a second older.
-    since = datetime.now(UTC)
-    eventually(lambda: datetime.now(UTC) > since + timedelta(seconds=0.2))
-    store.command(young.id, Command.CANCEL)
+    monkeypatch.setattr("gaitswarm.services.optimizer.housekeeping._STEADY_SECONDS", -1.0)
+    clock = Clock()
+    clock.now = datetime.now(UTC) - timedelta(hours=2)
+    with closing(open_store(str(database), clock=clock)) as store:
+        old, young = (store.create_job(spec)[0] for _ in range(2))
+        store.command(old.id, Command.CANCEL)
+        clock.now = datetime.now(UTC)
+        store.command(young.id, Command.CANCEL)
 
-    Housekeeping(store, retention_days=None).round()
-    assert len(store.jobs().items) == 2
-    Housekeeping(store, retention_days=0.1 / 86_400).round()
-    assert [job.id for job in store.jobs().items] == [young.id]
+        Housekeeping(store, retention_days=None).round()
+        assert len(store.jobs().items) == 2
+        Housekeeping(store, retention_days=1 / 24).round()
+        assert [job.id for job in store.jobs().items] == [young.id]
+
+
+def test_housekeeping_removes_a_deleted_job_after_a_day_only(
+    database: Path, spec: JobSpec, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gaitswarm.services.optimizer.housekeeping._STEADY_SECONDS", -1.0)
+    clock = Clock()
+    with closing(open_store(str(database), clock=clock)) as store:
+        job, _ = store.create_job(spec)
+        store.command(job.id, Command.CANCEL)
+        keeper = Housekeeping(store)
+        for seconds, restorable in ((86_000.0, True), (86_500.0, False)):
+            store.delete_job(job.id)
+            clock.advance(seconds)
+            keeper.round()
+            with closing(sqlite3.connect(database)) as connection:
+                (count,) = connection.execute("SELECT count(*) FROM jobs").fetchone()
+            assert count == restorable
+            if restorable:
+                store.restore_job(job.id)
 
 
 def test_housekeeping_deletes_nothing_until_the_clock_was_steady_for_a_day(

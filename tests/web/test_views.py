@@ -171,3 +171,4 @@ def test_the_api_documentation_complies_with_its_content_security_policy(
     page = visit(server.url).go("/docs")
 
     expect(page.get_by_role("heading", name="gaitswarm").first).to_be_visible()
+    expect(page.locator("html")).to_have_attribute("lang", "en")

@@ -97,8 +97,8 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
           <section class="card">
             <Empty title="There is no such job" level={1}>
               <p>
-                Job {id} was deleted or belongs to another server. Look for it in the{' '}
-                <a href="/jobs">list of jobs</a>.
+                Job {id} was deleted or belongs to another server. A deleted job can be restored for
+                24 hours. Others are in the <a href="/jobs">list of jobs</a>.
               </p>
               <Restore id={id} />
             </Empty>

@@ -44,9 +44,9 @@ from gaitswarm.sim.assembly import PHYSICS_RATE, control_steps, plan_walk
 from gaitswarm.sim.compiler.compilation import Target, target
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.native import load_kernel
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.mujoco.mjcf import Rig, Surroundings, mjcf
 from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.robot import load_robot

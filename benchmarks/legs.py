@@ -24,7 +24,8 @@ from gaitswarm.sim.assembly import PHYSICS_RATE
 from gaitswarm.sim.kernel.walk import walk_together
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_robot
-from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, load_robot, parse_robot
+from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import simulating
 from tests.examples.paths import QUADRUPED

@@ -27,7 +27,8 @@ from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.sim.assembly import kernel_of
-from gaitswarm.sim.kernel.walk import LaneUse, Precision
+from gaitswarm.sim.kernel import Precision
+from gaitswarm.sim.kernel.walk import LaneUse
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 
 _SHARES: Final = {

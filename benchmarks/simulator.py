@@ -15,8 +15,9 @@ import numpy as np
 
 from gaitswarm.sim.assembly import PHYSICS_RATE, Backend, kernel_of
 from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.native import NativeKernel
-from gaitswarm.sim.kernel.walk import KernelTime, Precision, walk_together
+from gaitswarm.sim.kernel.walk import KernelTime, walk_together
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import simulating

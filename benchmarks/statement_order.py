@@ -22,11 +22,13 @@ from unittest.mock import patch
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.compiler.compilation import X86_TARGETS, Target, cpu_flags, load_library, target
 from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.emitted import emit_c
 from gaitswarm.sim.kernel.emitted.source import kernel_source
 from gaitswarm.sim.kernel.native import NativeKernel
-from gaitswarm.sim.kernel.walk import Precision, WalkSetup
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.kernel.walk import WalkSetup
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 
 ROBOTS: Final = ("szabadka2", "szabadka2-reconstructed")

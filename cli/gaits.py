@@ -13,7 +13,8 @@ from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
 from gaitswarm.sim.gait.gaits import GAITS, find_gait, leg_gaits, suits, supporting
 from gaitswarm.sim.gait.stability import static_stability
-from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
+from gaitswarm.sim.robot import RobotChoice, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import GaitName, Scenario
 from gaitswarm.simulation import PlannedGaitView
 

@@ -25,9 +25,9 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.walk import Kernel
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import OBJECTIVES, Objective, Outcome, Status
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.identifiable import with_parameters
-from gaitswarm.sim.robot.robot import with_shafts
+from gaitswarm.sim.robot.robot import Robot, with_shafts
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate as simulate_walk
 from gaitswarm.sim.variables import Variable

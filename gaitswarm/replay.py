@@ -23,7 +23,7 @@ from gaitswarm.sim.robot.description import RobotDescription
 from gaitswarm.sim.robot.meshes import urdf_digest
 from gaitswarm.sim.robot.shapes import VisibleLink
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
-from gaitswarm.sim.worlds import ground_of
+from gaitswarm.sim.worlds.walks import ground_of
 from gaitswarm.simulation import QUANTITIES
 
 VERSION: Final = 1

@@ -32,7 +32,7 @@ from gaitswarm.sim.proposal.formats import as_urdf
 from gaitswarm.sim.proposal.frame import Axis, Frame
 from gaitswarm.sim.proposal.legs import LegHints, reach_below
 from gaitswarm.sim.proposal.stance import walk_of_robot
-from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
+from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.bounds import (
     LONGEST_NAME,
     LONGEST_URDF,
@@ -50,6 +50,7 @@ from gaitswarm.sim.robot.meshes import (
     package_places,
 )
 from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, leg_points
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import mesh_bounds
 from gaitswarm.sim.robot.urdf import unphysical
 from gaitswarm.sim.scenario import SCENARIOS, Scenario

@@ -27,8 +27,8 @@ from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait.stability import Stability, static_stability
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, N_OBJECTIVES, OBJECTIVE_NAMES, Outcome, Status
 from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot

@@ -24,7 +24,7 @@ from gaitswarm.services.optimizer.search.registry import OptimizerName, Optimize
 from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.input import numbers_from_booleans
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.robot import RobotFiles, RobotVariant
 from gaitswarm.sim.robot.variant import SHIPPED
 from gaitswarm.sim.scenario import Scenario

@@ -24,8 +24,8 @@ from gaitswarm.sim.compiler.compilation import (
     find_compiler,
 )
 from gaitswarm.sim.controllers.quantisation import inference_source
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot.variant import SHIPPED, shipped_robot
 
 TARGETS: Final[Mapping[str, Target]] = {

@@ -17,6 +17,7 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.feed_forward import carrying_torques
 from gaitswarm.sim.gait.trajectory import Trajectory, desired_angles
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.parameters import (
     GRAVITY,
     SHOVE_DURATION,
@@ -24,19 +25,12 @@ from gaitswarm.sim.kernel.parameters import (
     internal_state_size,
     pack_parameters,
 )
-from gaitswarm.sim.kernel.walk import (
-    Coding,
-    Kernel,
-    Precision,
-    WalkResult,
-    WalkSetup,
-    current_smoothing,
-)
+from gaitswarm.sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup, current_smoothing
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import body_corners
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.terrain import height_grid

@@ -18,14 +18,16 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input import Data, check_distinct
-from gaitswarm.sim.kernel.walk import Precision, Walking, WalkRequest, WalkSetup, walk_together
+from gaitswarm.sim.kernel import Precision
+from gaitswarm.sim.kernel.walk import Walking, WalkRequest, WalkSetup, walk_together
 from gaitswarm.sim.outcome import N_OBJECTIVES, RESULTS, Objective, Outcome, Status
-from gaitswarm.sim.robot import Robot, RobotSource, load_robot
+from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.robot.identifiable import (
     CONVENTIONAL_VARIABLES,
     identifiable_variables,
     with_parameters,
 )
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.sim.variables import Variable, VariableName, VariableValue
 

@@ -10,7 +10,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.kernel.walk import Kernel, KernelTime, Precision, Walking, walk_together
+from gaitswarm.sim.kernel import Precision
+from gaitswarm.sim.kernel.walk import Kernel, KernelTime, Walking, walk_together
 from gaitswarm.sim.outcome import OBJECTIVES, RESULTS, Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import Scenario

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.sim.case import Case, Walk
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import Data
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.plugins import MISSING, Plugin, Registry, check_is, check_name, version_of
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.case import Case, Walk
 
 
 class CaseSettings(Data):
@@ -19,7 +21,7 @@ class CaseSettings(Data):
     name: str
 
 
-CreateCase = Callable[[Any, Walk], Case]
+CreateCase = Callable[[Any, "Walk"], "Case"]
 """(settings, walk) -> case that evaluates designs in place of that walk, with its `variables`."""
 
 

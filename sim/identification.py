@@ -19,13 +19,14 @@ from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input import message_of
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.dynamics.electrical import supply_voltage
 from gaitswarm.sim.kernel.observation import sensed_currents, split_states, walk_log
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Objective, Outcome, Status
-from gaitswarm.sim.robot import Robot, RobotSource, load_robot
+from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import check_reach
 from gaitswarm.sim.variables import VariableName

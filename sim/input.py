@@ -5,10 +5,23 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Tag
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    GetJsonSchemaHandler,
+    Tag,
+    TypeAdapter,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+from pydantic_core.core_schema import no_info_plain_validator_function
 
 from gaitswarm.sim.near_names import instead_of, nearest
 
@@ -62,6 +75,31 @@ def alternatives(
         return among_own(value) if isinstance(value, Mapping | BaseModel) else None
 
     return Discriminator(tag, custom_error_type="no_choice", custom_error_message=expected)
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """A model as an annotation, which is imported when a value is validated."""
+
+    module: str
+    name: str
+
+    @property
+    def model(self) -> type[BaseModel]:
+        """The model."""
+        found: type[BaseModel] = getattr(import_module(self.module), self.name)
+        return found
+
+    def _validate(self, value: Any) -> BaseModel:
+        return self.model.model_validate(value)
+
+    def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
+        return no_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(
+        self, _: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return handler(TypeAdapter(self.model).core_schema)
 
 
 def without_tags(location: Location) -> tuple[str | int, ...]:
@@ -187,6 +225,7 @@ def _alternatives(annotation: Any, tag: str | None = None) -> Iterator[tuple[str
     if origin is Annotated:
         inner, *extra = get_args(annotation)
         own = next((entry.tag for entry in extra if isinstance(entry, Tag)), tag)
+        inner = next((entry.model for entry in extra if isinstance(entry, Imported)), inner)
         yield from _alternatives(inner, own)
     elif origin in (Union, UnionType):
         for member in get_args(annotation):

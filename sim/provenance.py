@@ -10,8 +10,7 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.sim.assembly import has_native_kernel
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.outcome import OBJECTIVES_VERSION
 from gaitswarm.sim.plugins import MISSING, source_digest, version_of
 from gaitswarm.sim.robot import RobotSource, load_robot
@@ -105,6 +104,8 @@ def provenance_of(
     libraries: tuple[str, ...] = LIBRARIES,
 ) -> Provenance:
     """Return the provenance of this process's results for robots, without compiling."""
+    from gaitswarm.sim.assembly import has_native_kernel
+
     machines = [load_robot(robot) for robot in robots]
     content = "".join(m.description.model_dump_json() + m.urdf.text for m in machines)
     # With a compiler, the kernel is compiled or fails; the reference never replaces it.

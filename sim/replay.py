@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import VisibleLink, visible_links
 
 CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)

@@ -27,12 +27,12 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.gaits import LegGait, leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.walk import (
     NO_JOINT_PD,
     NO_SERVO,
     Kernel,
-    Precision,
     Walking,
     WalkRequest,
     WalkSetup,
@@ -41,8 +41,8 @@ from gaitswarm.sim.kernel.walk import (
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
-from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
-from gaitswarm.sim.robot.robot import with_shafts
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
+from gaitswarm.sim.robot.robot import Robot, with_shafts
 from gaitswarm.sim.scenario import Scenario
 
 _PLANS_KEPT: Final = 64

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from gaitswarm.sim.assembly import PHYSICS_RATE
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.simulate import lanes, prepare
 from tests.examples.processes import python
 from tests.robots.known import QUADRUPEDS, urdf_of

@@ -233,7 +233,7 @@ def _still_held_out(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
     """Return `variables` and `fixed` of the spec if options change them."""
-    from gaitswarm.sim.worlds import DRAWN
+    from gaitswarm.sim.worlds.perturbations import DRAWN
 
     ranges = dict(map(_range, options.get("ranges", ())))
     fixed_values = dict(name_and_value(entry, "set") for entry in options.get("fixed", ()))
@@ -255,7 +255,7 @@ def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> d
 
 def _range(entry: str) -> tuple[str, dict[str, str]]:
     """Return name and variable of NAME=LOW:HIGH."""
-    from gaitswarm.sim.worlds import PERTURBATIONS
+    from gaitswarm.sim.worlds.perturbations import PERTURBATIONS
 
     name, (low, high) = name_and_bounds(entry, "range")
     kinds = {variable.name: variable.kind for variable in PERTURBATIONS}

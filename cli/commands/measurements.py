@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.services.optimizer.analysis.targets import ReachedView, TargetsView
     from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk, Synchronised
-    from gaitswarm.sim.robot import Robot
+    from gaitswarm.sim.robot.robot import Robot
 
 LARGEST_FILE: Final = 1 << 28
 """Largest accepted log [B]; one second takes about 1 MB."""

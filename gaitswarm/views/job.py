@@ -14,10 +14,8 @@ from gaitswarm.services.optimizer.analysis.evaluations import (
     evaluation_views,
 )
 from gaitswarm.services.optimizer.analysis.feasibility import ClosestView
-from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import (
@@ -27,12 +25,13 @@ from gaitswarm.services.optimizer.jobs.job import (
     JobState,
     UnreadableSpec,
 )
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.services.optimizer.views import Finite, IterationIndex, JobName, View
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.views.base import PREFIX
 
 
@@ -415,10 +414,10 @@ def _summary(job: Job) -> dict[str, Any]:
             "particles": spec.optimizer.particles,
             "evaluations_planned": spec.budget,
         }
-    if isinstance(spec, JobSpec):
-        # Its cases are each scenario in every world.
-        readable["scenarios"] = [scenario.name for scenario in spec.resolved_scenarios()]
-        readable["controller"] = spec.controller
+        if spec.kind == "tuning":
+            # Its cases are each scenario in every world.
+            readable["scenarios"] = [scenario.name for scenario in spec.resolved_scenarios()]
+            readable["controller"] = spec.controller
     particles = getattr(spec, "particles", 0)
     return {
         **dict.fromkeys(("kind", "precision", "optimizer", "controller")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 import numpy as np
@@ -16,16 +17,9 @@ from gaitswarm.services.optimizer.analysis.fork import (
     with_start_designs,
 )
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
-from gaitswarm.services.optimizer.analysis.reference import with_references
 from gaitswarm.services.optimizer.errors import ProvenanceChanged, within
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import checked_spec
-from gaitswarm.services.optimizer.jobs.estimate import (
-    Estimate,
-    MeasuredRates,
-    checked_length,
-    estimate,
-)
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import (
@@ -37,15 +31,15 @@ from gaitswarm.services.optimizer.jobs.job import (
     check_priority,
     refusal,
 )
-from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import other_measure
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.sim.identification import RecordedWalk
 
 if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.jobs.estimate import Estimate, MeasuredRates
     from gaitswarm.services.optimizer.store import Store
+    from gaitswarm.sim.identification import RecordedWalk
 
 S = TypeVar("S", bound=Spec)
 
@@ -70,7 +64,6 @@ class JobService:
         self.longest_job = longest_job
         self.longest_fork = longest_fork
         self.longest_reference = longest_reference
-        self._rates = MeasuredRates()
         self._histories = HistoryCache(store)
 
     def submit(
@@ -134,8 +127,8 @@ class JobService:
     def submit_embedded(self, spec: Spec) -> Claim:
         """Validate a job and store it claimed by this process."""
         # Slow to import.
-        from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS  # noqa: PLC0415
-        from gaitswarm.services.optimizer.run.runner import runner_name  # noqa: PLC0415
+        from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
+        from gaitswarm.services.optimizer.run.runner import runner_name
 
         self._check(spec)
         return self.store.create_claimed_job(
@@ -147,6 +140,8 @@ class JobService:
 
     def _resolved(self, spec: Spec) -> Spec:
         """Look up start designs and the references of constraints, once."""
+        from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
+
         if isinstance(spec, PreferencesSpec):
             with within("tuning"):
                 spec = spec.model_copy(update={"tuning": self._resolved(spec.tuning)})
@@ -155,14 +150,24 @@ class JobService:
 
     def _referenced(self, spec: S, *, starts: bool = False) -> S:
         """Look up the references of constraints."""
+        from gaitswarm.services.optimizer.analysis.reference import with_references
+
         longest = self.longest_reference
         return with_references(spec, self.job, self.store.best, starts=starts, longest=longest)
 
     def recording(self, recording_id: str) -> RecordedWalk:
         return self.store.recordings([recording_id])[recording_id]
 
+    @cached_property
+    def _rates(self) -> MeasuredRates:
+        from gaitswarm.services.optimizer.jobs.estimate import MeasuredRates
+
+        return MeasuredRates()
+
     def estimate(self, spec: Spec) -> Estimate:
         """Estimate a job's cost from a measured simulation."""
+        from gaitswarm.services.optimizer.jobs.estimate import estimate
+
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         return estimate(self._resolved(spec), cases, self._rates)
@@ -212,6 +217,8 @@ class JobService:
 
     def _check_length(self, spec: Spec) -> float | None:
         """Return the simulated time of all simulations [s], None if unlimited."""
+        from gaitswarm.services.optimizer.jobs.estimate import checked_length
+
         if math.isinf(self.longest_job):
             return None
         cases = spec.cases(self.store.recordings(spec.recording_ids))

@@ -35,15 +35,9 @@ from gaitswarm.sim.kernel.emitted.source import control_tick
 from gaitswarm.sim.kernel.observation import encoder_angles, split_states
 from gaitswarm.sim.kernel.walk import Coding, WalkResult, WalkSetup
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
-from gaitswarm.sim.robot import (
-    DEFAULT_ROBOT,
-    Robot,
-    RobotChoice,
-    RobotFiles,
-    RobotVariant,
-    load_robot,
-)
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import PRESETS, Scenario
 
 _WIDTH: Final = 24

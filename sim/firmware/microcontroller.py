@@ -14,8 +14,8 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD, FRACTION_BITS,
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, check_gains
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 
 _INT32: Final = (1 << 31) - 1

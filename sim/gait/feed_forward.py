@@ -8,9 +8,9 @@ import numpy as np
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.gait.trajectory import Trajectory
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
+from gaitswarm.sim.robot.robot import Robot
 
 _ON_THE_GROUND: Final = 0.1
 """Share of a foot's lift up to which it counts as on the ground: the filter rounds its path."""

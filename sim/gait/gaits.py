@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.legs import LegKinematics
-from gaitswarm.sim.robot.robot import rows_of, values_by_leg
+from gaitswarm.sim.robot.robot import Robot, rows_of, values_by_leg
 from gaitswarm.sim.scenario import BY_LEG_GROUP, GaitName, Scenario
 from gaitswarm.sim.variables import split_name
 

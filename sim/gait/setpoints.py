@@ -16,7 +16,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles, stance_angles
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 
 FEWEST_ROWS: Final = 8

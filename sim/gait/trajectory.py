@@ -18,9 +18,9 @@ from gaitswarm.sim.gait.half_ellipse import half_ellipse
 from gaitswarm.sim.gait.inverse_kinematics import chain_angles, leg_angles
 from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
 from gaitswarm.sim.memory import require_room_for_scipy
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.legs import ChainLeg, LegKinematics
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 
 _BLOCK: Final = 2048

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Final
 from gaitswarm.sim.errors import KernelBuildError, ProcessEnded
 from gaitswarm.sim.kernel.emitted.source import kernel_source
 from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import RobotDescription
-from gaitswarm.sim.robot.robot import assembled
+from gaitswarm.sim.robot.robot import Robot, assembled
 
 if TYPE_CHECKING:
-    from gaitswarm.sim.kernel.walk import Precision
+    from gaitswarm.sim.kernel import Precision
 
 SECONDS: Final = 120.0
 """Time limit of a derivation, which takes one or two seconds after a second of start-up."""

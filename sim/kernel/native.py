@@ -17,6 +17,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.compiler.compilation import Target, load_library
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable, Response
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.derivation import derived_source
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
@@ -26,14 +27,13 @@ from gaitswarm.sim.kernel.walk import (
     PEAKS,
     Coding,
     LaneUse,
-    Precision,
     WalkResult,
     WalkResults,
     WalkSetup,
     check_gains,
 )
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.terrain import HeightGrid
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.walk import WalkSetup, current_smoothing
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -32,7 +32,7 @@ from gaitswarm.sim.kernel.walk import (
     check_gains,
 )
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 
 
 class ReferenceKernel:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import astuple, dataclass, field
 from itertools import islice
-from typing import Any, Final, Literal, Protocol, Self, TypeVar
+from typing import Any, Final, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,12 @@ from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.sensors import NO_ERRORS, SensorErrors
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
 from gaitswarm.sim.robot.description import EnergyConvention
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.terrain import HeightGrid
 
 T = TypeVar("T")
-
-Precision = Literal["single", "double"]
-"""Of the compiled physics. Positions, sums and control are in double precision in both."""
 
 INTEGRANDS: Final = (
     "torque",

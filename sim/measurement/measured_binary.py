@@ -21,7 +21,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.measurement.measured_csv import TIME, expected_channels, heading, log_of_columns
 from gaitswarm.sim.measurement.measured_log import MeasuredLog
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 
 LARGEST: Final = 1 << 30
 """Largest unpacked size of an npz file [B]."""

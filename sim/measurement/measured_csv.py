@@ -26,7 +26,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity, channels_by_kind
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 
 TIME: Final = "time [s]"
 

@@ -17,8 +17,8 @@ from gaitswarm.sim.kernel.observation import WalkLog, sensed_currents
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import check_reach, simulate
 

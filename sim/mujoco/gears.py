@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.robot import Robot
-from gaitswarm.sim.robot.robot import JointActuators
+from gaitswarm.sim.robot.robot import JointActuators, Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,8 +18,8 @@ from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.legs import tried_angles
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]

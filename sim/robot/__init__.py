@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.robot.variant import (
     DEFAULT_ROBOT,
     SHIPPED,
@@ -17,12 +16,10 @@ from gaitswarm.sim.robot.variant import (
 __all__ = [
     "DEFAULT_ROBOT",
     "SHIPPED",
-    "Robot",
     "RobotChoice",
     "RobotFiles",
     "RobotName",
     "RobotSource",
     "RobotVariant",
     "load_robot",
-    "parse_robot",
 ]

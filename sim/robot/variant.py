@@ -10,7 +10,7 @@ from collections import OrderedDict
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
@@ -27,8 +27,9 @@ from gaitswarm.sim.robot.bounds import (
     MOST_VALUES,
 )
 from gaitswarm.sim.robot.description import ContactLaw, Leg, PlannedSoles
-from gaitswarm.sim.robot.identifiable import with_parameters
-from gaitswarm.sim.robot.robot import Robot, parse_robot
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.robot.robot import Robot
 
 _REMEMBERED: Final = 1024
 
@@ -78,6 +79,9 @@ SHIPPED: Final[tuple[RobotName, ...]] = get_args(RobotName)
 @lru_cache(maxsize=8)
 def shipped_robot(name: str) -> Robot:
     """Load a robot that ships with gaitswarm."""
+    from gaitswarm.sim.robot.identifiable import with_parameters
+    from gaitswarm.sim.robot.robot import parse_robot
+
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
     folder = resources.files("gaitswarm.sim.robot") / name
@@ -166,7 +170,7 @@ RobotSource = Annotated[
 ]
 """A robot in jobs and requests."""
 
-RobotChoice = str | RobotVariant | RobotFiles | Robot
+RobotChoice: TypeAlias = "str | RobotVariant | RobotFiles | Robot"
 """A robot as an argument of the simulator."""
 
 
@@ -180,15 +184,17 @@ def load_robot(robot: RobotChoice) -> Robot:
     Raises:
         SimulationInputError: The robot is unknown, or its files cannot be used.
     """
-    if isinstance(robot, Robot):
-        return robot
     if isinstance(robot, str):
         return shipped_robot(robot)
-    return _load_files(robot) if isinstance(robot, RobotFiles) else _load_variant(robot)
+    if isinstance(robot, RobotFiles):
+        return _load_files(robot)
+    return _load_variant(robot) if isinstance(robot, RobotVariant) else robot
 
 
 @lru_cache(maxsize=32)
 def _load_files(files: RobotFiles) -> Robot:
+    from gaitswarm.sim.robot.robot import parse_robot
+
     return parse_robot(files.toml, files.urdf)
 
 

@@ -15,14 +15,16 @@ from gaitswarm.sim.case import MeasuredCase, SimulatedCase
 from gaitswarm.sim.controllers import ControllerName, control_law
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.parameters import Layout, gravity_on
 from gaitswarm.sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
-from gaitswarm.sim.kernel.walk import Kernel, Precision, Walking, WalkSetup
+from gaitswarm.sim.kernel.walk import Kernel, Walking, WalkSetup
 from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
 from gaitswarm.sim.mujoco.mjcf import Soles
 from gaitswarm.sim.outcome import N_OBJECTIVES, Objective, Outcome
-from gaitswarm.sim.robot import Robot, RobotSource, load_robot
+from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles, rotated
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, plan_of_scenario, walking
 from gaitswarm.sim.terrain import HeightGrid, Plane, Rough, height_grid, rough_grid

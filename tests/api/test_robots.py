@@ -11,7 +11,7 @@ from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.limited_process import LimitedProcesses
 from gaitswarm.sim.proposal import document
 from gaitswarm.sim.proposal.document import propose_robot
-from gaitswarm.sim.robot import parse_robot
+from gaitswarm.sim.robot.robot import parse_robot
 from tests.examples.hostile import chain
 from tests.robots.test_formats import ALONE, DOG, MJCF
 from tests.robots.test_proposal import STATUE, dog

@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from gaitswarm.sim.simulate import simulate
-from gaitswarm.sim.worlds import WorldWalk
+from gaitswarm.sim.worlds.walks import WorldWalk
 from tests.certificate.examples import PI, small
 from tests.examples.jobs import history
 

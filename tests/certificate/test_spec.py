@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import (
     certificate_scenarios,
 )
 from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS
-from gaitswarm.sim.worlds import DRAWN, sample_worlds
+from gaitswarm.sim.worlds.perturbations import DRAWN, sample_worlds
 from tests.certificate.examples import DOCUMENT, PI, small
 
 

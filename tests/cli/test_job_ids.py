@@ -70,6 +70,7 @@ COMMANDS = {
     "verdict": "ID --json",
     "submit": "--start-from ID,ID --json",
     "targets": "ID",
+    "trajectories": "ID --output FILE",
     "validate": "MEASURED --design job:ID --scenario 1 --cycles 2 --json",
     "verify": "ID --replay 0",
     "watch": "ID --json",

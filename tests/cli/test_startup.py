@@ -30,8 +30,13 @@ RARE = (
     "scipy", "casadi", "pinocchio", "ray", "fastapi", "matplotlib", "pyarrow", "alembic",
     "gaitswarm.cli.commands.analysis", "gaitswarm.jobs.server", "gaitswarm.jobs.types",
     "gaitswarm.robots", "gaitswarm.services.optimizer.jobs.designs", "gaitswarm.services.runtime",
-    "gaitswarm.services.optimizer.run.runner", "gaitswarm.sim.kernel.native",
-    "gaitswarm.simulation",
+    "gaitswarm.services.optimizer.run.runner", "gaitswarm.simulation", "gaitswarm.sim.assembly",
+    "gaitswarm.sim.case", "gaitswarm.sim.kernel.walk", "gaitswarm.sim.robot.robot",
+    "sqlalchemy.dialects.postgresql",
+    *(
+        f"gaitswarm.services.optimizer.jobs.kinds.{other}"
+        for other in ("calibration", "certificate", "identification", "preferences")
+    ),
 )  # fmt: skip
 
 

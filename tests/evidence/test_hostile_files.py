@@ -19,7 +19,7 @@ import gaitswarm
 from gaitswarm.evidence.archive import archived, parsed_json
 from gaitswarm.evidence.page import MANIFEST
 from gaitswarm.sim.errors import ProcessEnded
-from gaitswarm.sim.robot import check, variant
+from gaitswarm.sim.robot import check
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, Change, Proved, tampered, with_manifest
 from tests.examples.hostile import TOML, URDF, chain
@@ -159,7 +159,7 @@ def test_a_robot_that_ends_a_parser_ends_another_process_than_this(
         raise AssertionError("the robot was read in this process")
 
     monkeypatch.setattr(check.PROCESSES, "ask", ended)
-    monkeypatch.setattr(variant, "parse_robot", parsed_here)
+    monkeypatch.setattr("gaitswarm.sim.robot.robot.parse_robot", parsed_here)
     members = {n: m for n, m in unzipped(proved.content).items() if n != MANIFEST}
     members["certificates/of-best/spec.json"] = members["spec.json"]
     members[name] = with_robot(f"# {name}\n{TOML}", URDF)(members[name])

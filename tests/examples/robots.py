@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import RobotDescription
 from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.robot.robot import Robot
 from tests.examples.paths import QUADRUPED
 
 SLOW: Final[dict[str, Any]] = {

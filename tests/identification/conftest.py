@@ -8,7 +8,8 @@ import pytest
 
 from gaitswarm.sim.identification import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_log import simulated_log, synchronise
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot
 from scripts.synthesize import Perturbation, synthetic_log
 from tests.examples.walks import PUBLISHED_A, logged_walk, short_walk
 

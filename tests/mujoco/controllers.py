@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gaitswarm.sim.controllers.fuzzy_pi import quantised_table
 from gaitswarm.sim.controllers.mamdani import Shape
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from tests.mujoco.walker import CONTROL_PERIOD, Floats
 
 Ints = NDArray[np.int64]

@@ -14,7 +14,8 @@ from gaitswarm.sim.kernel.walk import WalkResult
 from gaitswarm.sim.mujoco.kernel import MujocoKernel
 from gaitswarm.sim.mujoco.mjcf import Soles
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
+from gaitswarm.sim.robot import RobotChoice, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 
 

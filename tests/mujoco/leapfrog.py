@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.mujoco.gears import Actuation, Gears
 from gaitswarm.sim.mujoco.ground import Ground
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from tests.mujoco.resistance import Resistance, apply_forces, feet_of
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.mujoco.ground import DeadZone, Ground, Karnopp, LinearZone, Stick
 from gaitswarm.sim.mujoco.model import model
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 
 Floats = NDArray[np.float64]
 Drag = tuple[Floats, Floats]

@@ -12,7 +12,8 @@ from gaitswarm.sim.kernel.parameters import pack_parameters
 from gaitswarm.sim.mujoco.gears import Gears, LooseGears
 from gaitswarm.sim.mujoco.ground import Ground, Stick
 from gaitswarm.sim.mujoco.model import model
-from gaitswarm.sim.robot import Robot, RobotChoice, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotChoice, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import STEEP, random_state, torque_quadruped_files
 from tests.mujoco.leapfrog import Leapfrog

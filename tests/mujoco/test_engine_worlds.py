@@ -17,7 +17,8 @@ from gaitswarm.sim.mujoco.kernel import MujocoKernel, WalkStopped
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario
-from gaitswarm.sim.worlds import DRAWN, EngineWalk, WorldWalk, sample_worlds
+from gaitswarm.sim.worlds.perturbations import DRAWN, sample_worlds
+from gaitswarm.sim.worlds.walks import EngineWalk, WorldWalk
 from tests.examples.walks import UPHILL_WALK
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,8 @@ import pytest
 
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_robot
-from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
+from gaitswarm.sim.robot import RobotFiles, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from tests.mujoco.controllers import Pi

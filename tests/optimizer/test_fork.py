@@ -16,10 +16,10 @@ from gaitswarm.services.optimizer.errors import (
     NotFound,
     ProvenanceChanged,
 )
-from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store

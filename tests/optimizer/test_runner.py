@@ -16,11 +16,11 @@ import pytest
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, KilledWorker, StoreUnavailable
-from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.outage import Backoff

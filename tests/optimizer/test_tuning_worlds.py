@@ -22,7 +22,8 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
-from gaitswarm.sim.worlds import DRAWN, WorldWalk, sample_worlds
+from gaitswarm.sim.worlds.perturbations import DRAWN, sample_worlds
+from gaitswarm.sim.worlds.walks import WorldWalk
 from tests.examples.jobs import history
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 

@@ -20,7 +20,7 @@ from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.sim.case import Walk
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
 

@@ -8,7 +8,8 @@ import pytest
 from gaitswarm.robots import check_robot
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import Proposal, propose_robot
-from gaitswarm.sim.robot import RobotFiles, parse_robot
+from gaitswarm.sim.robot import RobotFiles
+from gaitswarm.sim.robot.robot import parse_robot
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import QUADRUPED, dog
 

@@ -19,7 +19,7 @@ from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_mod
 from gaitswarm.sim.kernel.parameters import pack_parameters
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_robot
-from gaitswarm.sim.robot import Robot, parse_robot
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from tests.examples.walks import random_state, short_walk

@@ -11,10 +11,9 @@ from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import walking_proposal
 from gaitswarm.sim.proposal.legs import LegHints
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import DryFriction
 from gaitswarm.sim.robot.library import listed_actuators
-from gaitswarm.sim.robot.robot import parse_robot
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from tests.robots.test_proposal import dog
 
 

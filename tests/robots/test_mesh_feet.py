@@ -13,8 +13,8 @@ import pytest
 from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import propose_robot
-from gaitswarm.sim.robot import Robot, parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from tests.robots.test_proposal import dog
 
 NAME = "package://dog_description/meshes/calf.obj"

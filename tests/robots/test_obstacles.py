@@ -15,8 +15,8 @@ from gaitswarm.sim.proposal.document import Proposal, propose_robot, walking_pro
 from gaitswarm.sim.proposal.frame import AS_IT_IS
 from gaitswarm.sim.proposal.legs import LegHints
 from gaitswarm.sim.proposal.stance import HEIGHTS
-from gaitswarm.sim.robot import Robot, parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from tests.robots.test_mesh_feet import box
 from tests.robots.test_proposal import ARM, INERTIAL, dog
 

@@ -14,8 +14,9 @@ from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import Proposal, walking_proposal
-from gaitswarm.sim.robot import Robot, RobotFiles, parse_robot
+from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from tests.robots.radial import radial_robot

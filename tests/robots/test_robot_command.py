@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.cli.main import run
 from gaitswarm.sim.proposal.document import walking_proposal
-from gaitswarm.sim.robot import parse_robot
+from gaitswarm.sim.robot.robot import parse_robot
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import ARM, dog
 

@@ -11,8 +11,8 @@ import pytest
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import propose_robot
 from gaitswarm.sim.proposal.frame import AXES, Axis, Frame, turned
-from gaitswarm.sim.robot import parse_robot
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import HEXAPOD, QUADRUPED, dog

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.examples.walks import quadruped_files
 

@@ -19,10 +19,11 @@ from gaitswarm.sim.controllers.base import JointPd
 from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from gaitswarm.sim.controllers.mamdani import Shape
 from gaitswarm.sim.controllers.quantisation import compiled_table
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.native import NativeKernel
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import torque_quadruped_files
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.compiler.compilation import target
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.emitted.source import kernel_source
 from gaitswarm.sim.kernel.native import NativeKernel, native_kernel
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.sim.emulated import EmulatedLibrary, tools_for_arm
 from tests.sim.sanitized_walks import ROBOTS, digest_of_walks

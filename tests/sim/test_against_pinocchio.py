@@ -27,8 +27,8 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
     vector,
 )
 from gaitswarm.sim.kernel.parameters import gravity_on, pack_parameters
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.limbs import limbs_of
+from gaitswarm.sim.robot.robot import Robot
 from tests.examples.walks import STEEP, random_state
 from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.robot import RobotFiles, variant
+from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.robot.bounds import (
     DEEPEST,
     LONGEST_NAME,
@@ -125,6 +125,6 @@ def test_a_robot_whose_files_were_read_once_is_not_read_again_to_be_distinguishe
     robots = [{"toml": f"# {k}\n{TOML}", "urdf": URDF} for k in range(40)]
     for robot in robots:
         RobotFiles.model_validate(robot)
-    monkeypatch.setattr(variant, "parse_robot", None)
+    monkeypatch.setattr("gaitswarm.sim.robot.robot.parse_robot", None)
     for robot in robots:
         RobotFiles.model_validate(robot)

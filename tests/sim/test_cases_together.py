@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.calibration import CalibrationWalk
 from gaitswarm.sim.case import Case, MeasuredWalk, Walk, run_together
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.native import NativeKernel
-from gaitswarm.sim.kernel.walk import (
-    Coding,
-    Precision,
-    Walking,
-    WalkResult,
-    WalkSetup,
-    walk_together,
-)
+from gaitswarm.sim.kernel.walk import Coding, Walking, WalkResult, WalkSetup, walk_together
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import Scenario

@@ -19,10 +19,11 @@ from gaitswarm.sim.compiler.compilation import (
 )
 from gaitswarm.sim.controllers.quantisation import inference_source
 from gaitswarm.sim.errors import KernelBuildError
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
 from gaitswarm.sim.kernel.native import load_kernel, native_kernel
-from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.robot import Robot, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from tests.examples.walks import torque_quadruped_files
 from tests.sim.processes import ROOT, run_python
 from tests.sim.sanitized_walks import (

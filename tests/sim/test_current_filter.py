@@ -15,7 +15,8 @@ from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.observation import sensed_currents, walk_log
 from gaitswarm.sim.kernel.reference import reference_kernel
 from gaitswarm.sim.kernel.walk import Coding, current_smoothing
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot
 from tests.examples.robots import changed
 from tests.examples.walks import PUBLISHED_A, short_walk, walk
 

@@ -9,7 +9,8 @@ import pytest
 
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.replay import replay
-from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.robots import with_feet
 from tests.examples.walks import Floats, heading, logged_walk, share_of_the_intended_speed, walk

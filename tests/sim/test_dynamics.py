@@ -10,7 +10,7 @@ import pytest
 
 from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
 from gaitswarm.sim.kernel.parameters import gravity_on, pack_parameters
-from gaitswarm.sim.robot import Robot, parse_robot
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.walks import random_state, short_walk
 from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named

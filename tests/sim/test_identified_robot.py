@@ -9,8 +9,9 @@ import pytest
 
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import SHIPPED, Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import SHIPPED, RobotVariant, load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import simulate
 

@@ -19,7 +19,8 @@ from gaitswarm.sim.kernel.observation import walk_log
 from gaitswarm.sim.kernel.reference import ReferenceKernel, reference_kernel
 from gaitswarm.sim.kernel.walk import Coding, Kernel, WalkSetup
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import lanes, simulate
 from tests.examples import walks

@@ -15,9 +15,10 @@ import pytest
 
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.native import LaneCounts, NativeKernel, Pool, native_kernel
 from gaitswarm.sim.kernel.reference import reference_kernel
-from gaitswarm.sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
+from gaitswarm.sim.kernel.walk import Coding, LaneUse, WalkResult, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from gaitswarm.sim.robot.description import ContactLaw

@@ -12,10 +12,10 @@ import pytest
 from gaitswarm.sim.errors import BeyondJointLimit, RobotFileError
 from gaitswarm.sim.gait.inverse_kinematics import chain_angles, leg_angles
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
-from gaitswarm.sim.robot import Robot, RobotFiles, load_robot, parse_robot
+from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.legs import turned as turned_about
-from gaitswarm.sim.robot.robot import assembled
+from gaitswarm.sim.robot.robot import Robot, assembled, parse_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import quadruped_files, short_walk, walk
 

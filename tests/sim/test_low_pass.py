@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.gait.trajectory import FirWindow, desired_angles, fir_gains, low_pass
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 
 

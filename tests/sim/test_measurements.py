@@ -17,8 +17,9 @@ from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.walk import Coding, WalkSetup
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, Measurements, Status
 from gaitswarm.sim.replay import replay
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.description import EnergyConvention
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import Simulation, simulate
 from tests.examples.robots import changed

@@ -23,7 +23,8 @@ from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
 from gaitswarm.sim.kernel.native import NativeKernel, native_kernel
 from gaitswarm.sim.kernel.parameters import Layout
 from gaitswarm.sim.kernel.walk import Coding
-from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotFiles, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import prepare
 from tests.examples.paths import copy_package

@@ -11,8 +11,8 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.parameters import pack_parameters
 from gaitswarm.sim.noise import LinkNoise
-from gaitswarm.sim.robot import Robot, load_robot
-from gaitswarm.sim.robot.robot import with_shafts
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot, with_shafts
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.walks import short_walk, walk
 

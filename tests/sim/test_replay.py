@@ -11,8 +11,9 @@ import pytest
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.replay import Replay, replay, ticks_at
-from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
 from gaitswarm.sim.robot.posture import feet_below_body
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.paths import QUADRUPED
 from tests.examples.robots import with_feet

@@ -21,9 +21,8 @@ from gaitswarm.sim.kernel.walk import Coding, WalkSetup
 from gaitswarm.sim.mujoco import gears
 from gaitswarm.sim.proposal.document import Proposal, walking_proposal
 from gaitswarm.sim.proposal.legs import LegHints
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.library import listed_actuator
-from gaitswarm.sim.robot.robot import parse_robot
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.simulate import check_drives, simulate
 from tests.examples.pendulum import TRAJECTORIES, Pendulum, bench, swing, times
 from tests.examples.walks import servo_quadruped_files, short_walk, walk

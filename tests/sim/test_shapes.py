@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import Shape, VisibleLink, visible_links
 from gaitswarm.sim.robot.urdf import parse_urdf
 

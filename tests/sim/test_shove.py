@@ -14,7 +14,8 @@ from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.walk import WalkResult
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario, find_scenario
 from tests.examples.walks import logged_walk, short_walk, walk
 

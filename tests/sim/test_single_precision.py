@@ -15,10 +15,12 @@ from gaitswarm.sim.compiler.compilation import Target, load_library, target, vec
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.native import NativeKernel, load_kernel, native_kernel
-from gaitswarm.sim.kernel.walk import Precision, WalkSetup
+from gaitswarm.sim.kernel.walk import WalkSetup
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 
 TOLERANCE = 1e-4

@@ -17,16 +17,16 @@ from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
 from gaitswarm.sim.compiler.compilation import X86, Target, host_architecture, target
 from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.native import load_kernel
 from gaitswarm.sim.kernel.parameters import pack_parameters
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
 from gaitswarm.sim.robot.shapes import body_corners
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.terrain import Grid, Rough, Stairs, Steps, height_grid
-from gaitswarm.sim.worlds import PerturbedWalk, WorldWalk
+from gaitswarm.sim.worlds.walks import PerturbedWalk, WorldWalk
 from tests.examples.walks import PUBLISHED_A, short_walk, walk
 
 ROUGH = {"kind": "rough", "amplitude": 0.01}

@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.urdf import parse_urdf
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import simulate

@@ -24,7 +24,7 @@ from gaitswarm.sim.compiler.compilation import (
     target,
     vector_header,
 )
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 
 pytestmark = pytest.mark.slow
 

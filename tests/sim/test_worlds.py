@@ -23,13 +23,8 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVarian
 from gaitswarm.sim.robot.identifiable import with_parameters
 from gaitswarm.sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
 from gaitswarm.sim.simulate import plan_of_scenario
-from gaitswarm.sim.worlds import (
-    DRAWN,
-    MeasuredPerturbedWalk,
-    PerturbedWalk,
-    WorldWalk,
-    sample_worlds,
-)
+from gaitswarm.sim.worlds.perturbations import DRAWN, sample_worlds
+from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk, PerturbedWalk, WorldWalk
 from tests.examples.walks import PUBLISHED_A, quadruped_files, short_walk, walk
 
 Floats = NDArray[np.float64]

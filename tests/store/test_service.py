@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.estimate import TimeLeft, recent_pace, time_left
 from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.time_left import TimeLeft, recent_pace, time_left
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.settings import Settings

@@ -8,7 +8,8 @@ import pytest
 
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, simulated_log
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario, find_scenario
 from scripts.measured_logs import format_measured_log
 from scripts.synthesize import synthetic_log

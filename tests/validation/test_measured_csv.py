@@ -11,7 +11,7 @@ import pytest
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
-from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import Robot
 from scripts.measured_logs import format_measured_log
 from tests.validation.walks import renamed_robot, szabadka, walking_log, without_supplements
 

@@ -18,8 +18,9 @@ from gaitswarm.sim.measurement.measured_log import (
     synchronise,
 )
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables
+from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.validation import compare_synchronised
 from scripts.measured_logs import format_measured_log
 from scripts.synthesize import Instruments, Perturbation, synthetic_log

@@ -9,7 +9,8 @@ from importlib import resources
 import numpy as np
 
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, synchronise
-from gaitswarm.sim.robot import Robot, load_robot, parse_robot
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.validation import Comparison, compare_synchronised
 
 CYCLE_TIME = 0.5

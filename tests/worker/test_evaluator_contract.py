@@ -16,7 +16,7 @@ from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.robot import RobotVariant
 from gaitswarm.sim.scenario import Scenario

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.reference import ReferenceView
 from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable

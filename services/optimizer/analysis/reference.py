@@ -10,7 +10,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 import numpy as np
-from pydantic import Field
 
 from gaitswarm.services.optimizer.errors import GaitswarmError, InvalidRequest, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.constraints import (
@@ -34,7 +33,6 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import by_design
 from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.case import run_together
 from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
@@ -60,32 +58,6 @@ _JUDGED_BY: Final = frozenset(
 """Fields of a spec on which a reference depends."""
 
 _log = logging.getLogger(__name__)
-
-
-class ReferenceView(View):
-    """The design that a job's best is compared with."""
-
-    name: str = Field(
-        description="Study or preference for which it was published, `start design`, the id of a"
-        " job, or `given design`.",
-        examples=["A"],
-    )
-    kind: ReferenceKind = Field(
-        default="published",
-        description="`published`, or without one `start`: the middle of the job's bounds; on"
-        " request `job`, the best design of another one, or `design`.",
-    )
-    fitness: Finite = Field(
-        description="By the job's measure, in double precision [1]; null if it fails.",
-        examples=[20.72],
-    )
-
-    @classmethod
-    def from_reference(cls, reference: Reference | None) -> ReferenceView | None:
-        """Return None without a reference."""
-        if reference is None or reference.name is None:
-            return None
-        return cls.model_validate(reference)
 
 
 def walked_reference(spec: Spec) -> Reference:

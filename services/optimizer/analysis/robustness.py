@@ -31,7 +31,7 @@ from gaitswarm.services.optimizer.views import DesignValues, Finite, View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import RobotSource

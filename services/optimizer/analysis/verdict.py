@@ -21,11 +21,10 @@ from gaitswarm.services.optimizer.analysis.bounds import (
     with_wider_bounds,
 )
 from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, LimitView, limit_views
-from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
+from gaitswarm.services.optimizer.jobs.kinds.reference import Reference, ReferenceView
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.arrays import Floats

@@ -17,12 +17,13 @@ from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, Scenarios
 from gaitswarm.sim.simulate import Simulation, check_drives, check_reach, simulate
 from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.sim.worlds import MeasuredPerturbedWalk, check_worlds, ground_of
+from gaitswarm.sim.worlds.perturbations import check_worlds
+from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk, ground_of
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 

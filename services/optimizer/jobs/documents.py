@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
-from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.sim.input import message_of
+from gaitswarm.sim.input import Imported, message_of
 
 
 def _kind(value: Any) -> str:
@@ -22,23 +17,36 @@ def _kind(value: Any) -> str:
     return f"<{document.get('kind', 'tuning')}>"
 
 
-AnySpec = Annotated[
-    Annotated[JobSpec, Tag("<tuning>")]
-    | Annotated[IdentificationSpec, Tag("<identification>")]
-    | Annotated[CalibrationSpec, Tag("<calibration>")]
-    | Annotated[CertificateSpec, Tag("<certificate>")]
-    | Annotated[PreferencesSpec, Tag("<preferences>")],
-    Discriminator(
-        _kind,
-        custom_error_type="unknown_kind",
-        custom_error_message="kind: must be tuning, identification, calibration, certificate or"
-        " preferences",
-    ),
-]
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+    from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+    from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 
-SPECS: Final[
-    TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec | PreferencesSpec]
-] = TypeAdapter(AnySpec)
+    AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec | PreferencesSpec
+else:
+
+    def _spec(kind, name):
+        """Member of the union, which is imported when a document of its kind is validated."""
+        module = f"gaitswarm.services.optimizer.jobs.kinds.{kind}"
+        return Annotated[Any, Imported(module, name), Tag(f"<{kind}>")]
+
+    AnySpec = Annotated[
+        _spec("tuning", "JobSpec")
+        | _spec("identification", "IdentificationSpec")
+        | _spec("calibration", "CalibrationSpec")
+        | _spec("certificate", "CertificateSpec")
+        | _spec("preferences", "PreferencesSpec"),
+        Discriminator(
+            _kind,
+            custom_error_type="unknown_kind",
+            custom_error_message="kind: must be tuning, identification, calibration, certificate"
+            " or preferences",
+        ),
+    ]
+
+SPECS: Final[TypeAdapter[AnySpec]] = TypeAdapter(AnySpec)
 """Validates a spec of any kind; raises ValidationError."""
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
-from typing import Final, TypedDict
+from typing import TYPE_CHECKING, Final, TypedDict
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, QuotaExceeded, Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -19,7 +19,9 @@ from gaitswarm.services.optimizer.jobs.provenance import (
     ProvenanceRecords,
     changes_since,
 )
-from gaitswarm.sim.identification import Recordings
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.identification import Recordings
 
 DEFAULT_PRIORITY: Final = 0
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,15 +35,16 @@ from gaitswarm.services.optimizer.search.registry import (
     create_search,
 )
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.assembly import check_precision
-from gaitswarm.sim.case import Case
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.identification import RecordedWalk, Recordings
 from gaitswarm.sim.input import Line
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.variables import VariableChoice, VariableName, VariableValue
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.case import Case
+    from gaitswarm.sim.identification import RecordedWalk, Recordings
 
 _DESIGNS: Final = "<designs>"
 _JOBS: Final = "<jobs>"
@@ -245,6 +246,8 @@ class Spec(BaseModel):
 
     def check_can_be_simulated(self) -> None:
         """Check what only the simulator can decide: whether designs can be simulated."""
+        from gaitswarm.sim.assembly import check_precision
+
         method = METHODS[self.search.name]
         if method.missing:
             raise InvalidRequest(

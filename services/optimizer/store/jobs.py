@@ -22,7 +22,6 @@ from gaitswarm.services.optimizer.errors import (
 )
 from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from gaitswarm.services.optimizer.jobs.documents import check_budget
-from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Fork
 from gaitswarm.services.optimizer.jobs.job import (
     DELETABLE,
@@ -58,6 +57,7 @@ from gaitswarm.services.optimizer.jobs.listing import (
 )
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import take_history
 from gaitswarm.services.optimizer.store.job_rows import (

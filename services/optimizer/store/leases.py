@@ -11,7 +11,6 @@ from typing import Any, Final
 from sqlalchemy import ColumnElement, Connection, and_, delete, not_, or_, select
 
 from gaitswarm.services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
-from gaitswarm.services.optimizer.jobs.estimate import recent_pace
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration, JournalEntry
 from gaitswarm.services.optimizer.jobs.job import (
     QUARANTINE_AFTER,
@@ -22,6 +21,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 )
 from gaitswarm.services.optimizer.jobs.listing import storable
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, JobProvenance, with_record
+from gaitswarm.services.optimizer.jobs.time_left import recent_pace
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import (
     answered_ask,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import fields
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 from sqlalchemy import Connection, func, insert, select, tuple_
@@ -26,8 +27,10 @@ from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import first_problems, unreadable
 from gaitswarm.services.optimizer.store.tables import recordings
 from gaitswarm.services.optimizer.store.tokens import note_change
-from gaitswarm.sim.identification import RecordedWalk
-from gaitswarm.sim.identification import Recordings as Walks
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.identification import RecordedWalk
+    from gaitswarm.sim.identification import Recordings as Walks
 
 
 class Recordings(Aggregate):
@@ -88,6 +91,8 @@ def load_recordings(connection: Connection, ids: Sequence[str]) -> Walks:
     """Return recorded walks by id. Raises NotFound and Unreadable."""
     if not ids:
         return {}
+    from gaitswarm.sim.identification import RecordedWalk
+
     query = select(recordings.c.id, recordings.c.document).where(recordings.c.id.in_(ids))
     documents = {row.id: row.document for row in connection.execute(query)}
     walks = {}

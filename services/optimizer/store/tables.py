@@ -134,7 +134,7 @@ jobs: Final = sa.Table(
     sa.Index(None, "created_at", "id"),
     sa.Index(None, "state", "created_at", "id"),
     # Of deleted jobs only: SQLite would use a full index to find all others, and sort these.
-    sa.Index(None, "deleted_at", sqlite_where=_DELETED, postgresql_where=_DELETED),
+    sa.Index(None, "deleted_at", sqlite_where=_DELETED),
     sa.Index(None, "best_fitness", "id"),
     # Columns that lists filter and sort by. SQLite reads rows from their start, where the spec,
     # which may be large, precedes them; PostgreSQL stores large documents apart.

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.kernel.dynamics.spatial import Scalar, leaves, mapped
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.limbs import Limb, LimbJoint, electrical_constants, limbs_of
+from gaitswarm.sim.robot.robot import Robot
 
 
 @lru_cache(maxsize=64)

@@ -24,9 +24,9 @@ from gaitswarm.sim.kernel.dynamics.limb import Environment, Held, LimbState, aft
 from gaitswarm.sim.kernel.dynamics.spatial import Force, Inertia, Motion, Scalar, leaves, mapped
 from gaitswarm.sim.kernel.emitted.emit_c import emit_c
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.limbs import Limb, limbs_of
+from gaitswarm.sim.robot.robot import Robot
 
 _PASSED: Final = 27
 """Numbers that a limb passes to the body: an inertia (6 + 9 + 6) and a force (6)."""

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final
 from gaitswarm.sim.compiler.compilation import vector_header
 from gaitswarm.sim.kernel.dynamics.kinds import limb_kinds
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
-from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.actuators import CONTROL_RATE
 from gaitswarm.sim.robot.limbs import limbs_of
+from gaitswarm.sim.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from gaitswarm.sim.kernel.walk import Precision
+    from gaitswarm.sim.kernel import Precision
 
 _GENERATORS: Final = ("gaitswarm.sim.kernel.dynamics", "gaitswarm.sim.kernel.emitted")
 """Packages whose files all determine the source, besides the layout of parameters."""

@@ -38,16 +38,14 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice, ScenarioName
 from gaitswarm.sim.simulate import check_reach
 from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.sim.worlds import (
+from gaitswarm.sim.worlds.perturbations import (
     DRAWN,
+    NOMINAL,
     PERTURBATIONS,
-    EngineWalk,
-    WorldWalk,
-    check_grounds,
     check_worlds,
     sample_worlds,
 )
-from gaitswarm.sim.worlds.perturbations import NOMINAL
+from gaitswarm.sim.worlds.walks import EngineWalk, WorldWalk, check_grounds
 
 CASES: Final = 8
 """Default number of scenarios of a certificate."""

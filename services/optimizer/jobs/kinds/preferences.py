@@ -37,7 +37,7 @@ from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, run_together
 from gaitswarm.sim.identification import Recordings
-from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.outcome import OBJECTIVES, Objective, Outcome, Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable

@@ -8,10 +8,12 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from gaitswarm.sim.robot.variant import RobotFiles
@@ -50,6 +52,32 @@ class Reference:
         if fitness is None or self.fitness is None or not self.fitness > 0.0:
             return None
         return 1.0 - fitness / self.fitness
+
+
+class ReferenceView(View):
+    """The design that a job's best is compared with."""
+
+    name: str = Field(
+        description="Study or preference for which it was published, `start design`, the id of a"
+        " job, or `given design`.",
+        examples=["A"],
+    )
+    kind: ReferenceKind = Field(
+        default="published",
+        description="`published`, or without one `start`: the middle of the job's bounds; on"
+        " request `job`, the best design of another one, or `design`.",
+    )
+    fitness: Finite = Field(
+        description="By the job's measure, in double precision [1]; null if it fails.",
+        examples=[20.72],
+    )
+
+    @classmethod
+    def from_reference(cls, reference: Reference | None) -> ReferenceView | None:
+        """Return None without a reference."""
+        if reference is None or reference.name is None:
+            return None
+        return cls.model_validate(reference)
 
 
 def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:

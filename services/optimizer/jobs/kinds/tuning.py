@@ -41,20 +41,19 @@ from gaitswarm.services.optimizer.jobs.preference import (
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.case import Case, MeasuredWalk, Walk
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
-from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, RESULTS, Objective
 from gaitswarm.sim.plugins import PluginSettings
 from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice, Scenarios
-from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import Variable, split_name
-from gaitswarm.sim.worlds import check_grounds, check_worlds
-from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.case import Case
+    from gaitswarm.sim.identification import Recordings
 
 
 class WalksSpec(Scenarios, Spec):
@@ -76,6 +75,8 @@ class WalksSpec(Scenarios, Spec):
         Raises:
             InvalidRequest: It cannot; the field is `controller`.
         """
+        from gaitswarm.sim.simulate import check_drives
+
         with simulation_errors("controller"):
             check_drives(law, self.robot)
 
@@ -289,6 +290,10 @@ class JobSpec(WalksSpec):
 
     def check_can_be_simulated(self) -> None:
         """Check that the controller compiles and that scenarios' gentlest gaits are in reach."""
+        from gaitswarm.sim.simulate import check_reach
+        from gaitswarm.sim.worlds.perturbations import check_worlds
+        from gaitswarm.sim.worlds.walks import check_grounds
+
         super().check_can_be_simulated()
         space, scenarios = self.design_space(), self.resolved_scenarios()
         for design in space.corners():
@@ -343,6 +348,9 @@ class JobSpec(WalksSpec):
             controller: Of the designs.
             names: Of their variables, in the order of the columns.
         """
+        from gaitswarm.sim.case import MeasuredWalk, Walk
+        from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk
+
         if self.worlds is not None:
             pairs = product(self.resolved_scenarios(), self.worlds.drawn())
             return tuple(

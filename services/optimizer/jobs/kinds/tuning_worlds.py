@@ -16,7 +16,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import Data, message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
-from gaitswarm.sim.worlds import DRAWN, PERTURBATIONS, sample_worlds
+from gaitswarm.sim.worlds.perturbations import DRAWN, PERTURBATIONS, sample_worlds
 
 Aggregate = Literal["mean", "quantile", "worst", "cvar"]
 

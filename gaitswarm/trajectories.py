@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from operator import itemgetter
 from pathlib import Path
 
-import numpy as np
 from pydantic import Field
 
 from gaitswarm.robots import check_new, write_new
@@ -43,6 +43,14 @@ class TrajectoriesRequest(ScenariosRequest):
             }
 
 
+class FastJointView(View):
+    """A joint that turns faster than its motor does without load."""
+
+    joint: str = Field(description="Name of the joint.")
+    speed: float = Field(description="Its largest speed [rad/s].")
+    no_load_speed: float = Field(description="Of its motor at the battery's voltage [rad/s].")
+
+
 class ScenarioTrajectoryView(View):
     """Desired angles of a scenario."""
 
@@ -51,6 +59,7 @@ class ScenarioTrajectoryView(View):
     rows: dict[str, int] = Field(description="By part: start, cycle and stop.")
     fastest_joint: str = Field(description="The joint that turns fastest.")
     largest_speed: float = Field(description="Its largest speed [rad/s].")
+    too_fast: list[FastJointView] = Field(description="Joints that cannot follow.")
 
 
 class TrajectoriesView(View):
@@ -63,13 +72,18 @@ class TrajectoriesView(View):
 
 
 def _scenario_view(name: str, points: Setpoints) -> ScenarioTrajectoryView:
-    speeds = np.abs(points.velocities).max(axis=0)
+    fastest, largest, _ = max(points.speeds, key=itemgetter(1))
     return ScenarioTrajectoryView(
         scenario=name,
         step=points.step,
         rows={part: len(rows) for part, rows in points.parts.items()},
-        fastest_joint=points.joints[speeds.argmax()],
-        largest_speed=float(speeds.max()),
+        fastest_joint=fastest,
+        largest_speed=largest,
+        too_fast=[
+            FastJointView(joint=joint, speed=speed, no_load_speed=limit)
+            for joint, speed, limit in points.speeds
+            if speed > limit
+        ],
     )
 
 
@@ -89,6 +103,7 @@ def write_trajectories(
     A scenario's `NAME-start.csv`, `NAME-cycle.csv` and `NAME-stop.csv` have a time [s] and angles
     [rad] by row: from the stance into the gait, a cycle to be repeated, and back to the stance.
     `NAME.yaml` is all of this as a ROS 2 message, with as many cycles as the scenario has.
+    `speeds.csv` compares every joint's largest speed with its motor's speed without load.
 
     Args:
         design: As of `write_firmware`; only its gait variables matter.
@@ -101,7 +116,8 @@ def write_trajectories(
             refuses.
 
     Returns:
-        Joints, files, rows, and the largest speed of a joint.
+        Joints, files, rows, the largest speed of a joint, and joints that are too fast for
+        their motors.
 
     Raises:
         InvalidRequest: An argument is invalid, a gait leaves the legs' reach, or the folder

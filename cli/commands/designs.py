@@ -418,4 +418,11 @@ def _trajectories(view: TrajectoriesView) -> Parts:
         for of in view.scenarios
     )
     yield table(["scenario", *heads], rows)
+    for of in view.scenarios:
+        for fast in of.too_fast:
+            note(
+                f"warning: {of.scenario}: {fast.joint} turns at {fast.speed:.3g} rad/s,"
+                f" {fast.speed / fast.no_load_speed - 1.0:.0%} faster than its motor without load"
+                f" ({fast.no_load_speed:.3g} rad/s)"
+            )
     note(f"{len(view.files)} files of {len(view.joints)} joints written to {view.folder}")

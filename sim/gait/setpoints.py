@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,6 +44,7 @@ class Setpoints:
     cycle: Floats  # (R, J)
     stop: Floats  # (S + 1, J)
     cycles: int  # of the scenario
+    speeds: tuple[tuple[str, float, float], ...]  # joint, largest and motor's without load [rad/s]
 
     @property
     def parts(self) -> dict[str, Floats]:
@@ -80,6 +81,8 @@ def setpoints(robot: Robot, scenario: Scenario, rate: float, *, held: bool = Tru
             f" {MOST_ROWS / (cycles + 2 * ramp) / cycle_time:.3g} Hz"
         )
     planned = desired_angles(robot, scenario.model_copy(update={"cycles": ramp + 1.5})).angles
+    # Targets that are held between updates turn by the mean speed over that time.
+    held_ticks = math.ceil(1.0 / (CONTROL_PERIOD * scenario.trajectory_rate) - 1e-9)
     ticks = CONTROL_PERIOD * np.arange(len(planned))
     times = cycle_time / rows * np.arange((ramp + 1) * rows)
     gait = np.stack([np.interp(times, ticks, angles) for angles in planned.T], axis=1)
@@ -93,7 +96,12 @@ def setpoints(robot: Robot, scenario: Scenario, rate: float, *, held: bool = Tru
         np.hstack([part, np.tile(np.array([*fixed.values()]), (len(part), 1))])
         for part in (start, cycle, stop)
     )
-    return Setpoints((*robot.joint_names, *fixed), cycle_time / rows, start, cycle, stop, cycles)
+    largest = np.abs(planned[held_ticks:] - planned[:-held_ticks]).max(axis=0)
+    largest /= CONTROL_PERIOD * held_ticks
+    limits = robot.no_load_speeds.tolist()
+    speeds = tuple(zip(robot.joint_names, largest.tolist(), limits, strict=True))
+    joints = (*robot.joint_names, *fixed)
+    return Setpoints(joints, cycle_time / rows, start, cycle, stop, cycles, speeds)
 
 
 def trajectory_files(points: Mapping[str, Setpoints]) -> dict[str, bytes]:
@@ -101,17 +109,23 @@ def trajectory_files(points: Mapping[str, Setpoints]) -> dict[str, bytes]:
     files = {}
     for name, of in points.items():
         for part, rows in of.parts.items():
-            files[f"{name}-{part}.csv"] = _csv_text(of.joints, of.step, rows).encode()
+            timed = (_texts(np.insert(row, 0, k * of.step)) for k, row in enumerate(rows))
+            files[f"{name}-{part}.csv"] = _csv_text(("time", *of.joints), timed).encode()
         files[f"{name}.yaml"] = _joint_trajectory_yaml(of).encode()
+    speeds = [
+        (name, joint, *_texts(np.array(values)))
+        for name, of in points.items()
+        for joint, *values in of.speeds
+    ]
+    files["speeds.csv"] = _csv_text(("scenario", "joint", "largest", "no_load"), speeds).encode()
     return files
 
 
-def _csv_text(joints: Sequence[str], step: float, rows: Floats) -> str:
-    """Write rows (T, J) [rad] with their time [s]."""
+def _csv_text(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(["time", *joints])
-    writer.writerows(_texts(np.insert(row, 0, number * step)) for number, row in enumerate(rows))
+    writer.writerow(heads)
+    writer.writerows(rows)
     return file.getvalue()
 
 

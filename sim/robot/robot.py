@@ -255,6 +255,17 @@ class Robot:
         return columns
 
     @property
+    def no_load_speeds(self) -> Floats:
+        """Speeds at which motors at full duty only overcome viscous friction, (J,) [rad/s]."""
+        a, voltage = self.actuators(), self.description.supply.voltage
+        if self.is_torque_controlled:
+            torque = a.stall_torque + a.stall_torque_per_volt * voltage
+            return torque / (a.torque_drop + a.viscous)
+        largest = 1.0 if self.servos is None else self.servos[3]
+        resisting = a.torque**2 + a.resistance * a.viscous
+        return largest * voltage * a.torque / resisting
+
+    @property
     def has_inner_loop(self) -> bool:
         """Whether actuators have their own control between control ticks."""
         return self.is_torque_controlled or self.servos is not None

@@ -119,7 +119,7 @@ def test_the_angles_of_a_job_are_written_for_servos(
     assert set(done.json["files"]) == {path.name for path in (tmp_path / "json").iterdir()}
     said = gaitswarm(*arguments, tmp_path / "text")
     assert "rad/s" in said.out and scenarios[0] in said.out
-    assert f"{4 * len(scenarios)} files of 18 joints" in said.err
+    assert f"{4 * len(scenarios) + 1} files of 18 joints" in said.err
 
 
 def test_a_folder_of_something_else_is_refused(gaitswarm: Gaitswarm, tmp_path: Path) -> None:

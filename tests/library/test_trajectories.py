@@ -16,9 +16,12 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.gait.setpoints import setpoints
 from gaitswarm.sim.gait.trajectory import Trajectory, desired_angles
 from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal.document import walking_proposal
+from gaitswarm.sim.proposal.legs import LegHints
 from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.posture import feet_in_body
 from tests.examples.walks import quadruped_files, short_walk
+from tests.robots.test_proposal import dog
 
 PI = {"P": 0.45, "I": 0.1}
 WALK = short_walk(cycles=2)
@@ -116,6 +119,29 @@ def test_a_ros_2_controller_accepts_the_message(tmp_path: Path) -> None:
     positions = np.array([point["positions"] for point in message["points"]])
     velocities = np.array([point["velocities"] for point in message["points"]])
     np.testing.assert_allclose(velocities[1:-1], (positions[2:] - positions[:-2]) / 0.04, atol=1e-4)
+
+
+def test_joints_faster_than_their_motors_are_named(tmp_path: Path) -> None:
+    """Without load, a servo turns at U duty / (k + R B / k)."""
+    made = walking_proposal(dog(), "dog", hints=LegHints(actuators={"*": "xl330"}))
+    robot = RobotFiles(toml=made.toml, urdf=made.urdf)
+    slow, fast = (
+        short_walk(cycle_time=cycle_time, stride=0.1, height=0.1, hip_height=0.3, radius=0.12)
+        for cycle_time in (4.0, 0.3)
+    )
+    folder = tmp_path / "f"
+    view = written(
+        folder, robot=robot, scenarios=[slow, fast.model_copy(update={"name": "fast"})], rate=500.0
+    )
+    no_load = 5.0 / (0.366013 + 2.81139 * 0.00535967 / 0.366013)
+    easy, hard = view.scenarios
+    assert easy.too_fast == [] and hard.too_fast
+    assert [of.no_load_speed for of in hard.too_fast] == pytest.approx([no_load] * 4)
+    assert max(of.speed for of in hard.too_fast) == hard.largest_speed > no_load
+    _, *rows = csv.reader((folder / "speeds.csv").read_text(encoding="utf-8").splitlines())
+    assert [row[:2] for row in rows[12:]] == [["fast", joint] for joint in view.joints]
+    beyond = [row[1] for row in rows[12:] if float(row[2]) > float(row[3])]
+    assert beyond == [of.joint for of in hard.too_fast]
 
 
 def test_held_joints_have_their_angle_or_no_column(tmp_path: Path) -> None:

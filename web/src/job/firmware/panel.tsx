@@ -91,7 +91,7 @@ export default function FirmwarePanel({ job }: { job: Job }) {
       >
         <p class="muted small">
           For position-controlled servos: start, one cycle and stop of every scenario, as CSV of 50
-          rows a second and as ROS 2 JointTrajectory.
+          rows a second and as ROS 2 JointTrajectory. Compare speeds.csv with the motors.
         </p>
       </Card>
     </div>

@@ -62,7 +62,7 @@ _HANGS: Final = 0.1
 the side that feet are on."""
 
 _SIDEWAYS: Final = 1.5
-"""How much farther legs that indicate a direction stand or swing along it than across."""
+"""How much farther legs that indicate a direction stand, swing or lie apart along it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,13 @@ def check_upright(urdf: Urdf, hips: Floats, feet: Floats) -> None:
 
 
 def sideways(legs: Sequence[ChainLeg], stance: Sequence[Sequence[float]]) -> bool:
-    """Infer that a robot faces y, from feet ahead of and behind their hips in the stance [rad]."""
+    """Infer that a robot faces y, from feet ahead of and behind their hips in the stance [rad].
+
+    Legs that turn about z and point along a body's length are believed.
+    """
+    length, width = np.ptp([leg.hip[:2] for leg in legs], axis=0)
+    if length > _SIDEWAYS * width and all(leg.is_upright for leg in legs):
+        return False
     sideways, ahead = 0.0, 0.0
     for leg, angles in zip(legs, stance, strict=True):
         if leg.is_upright:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -38,6 +39,11 @@ def in_frame(urdf: str, rpy: str) -> str:
 LEFT = in_frame(dog(), f"0 0 {math.pi / 2.0!r}")
 Y_UP = in_frame(dog(), f"{-math.pi / 2.0!r} 0 0")
 """As CAD exports it: y up, x ahead, z to the right."""
+CENTAUR = in_frame(
+    re.sub(r"(-?)0\.14 (-?)0\.08 0", r"\g<1>0.08 \g<2>0.14 0", QUADRUPED),
+    f"0 0 {math.pi / 2.0!r}",
+)
+"""Long along x, with legs that point ahead and back."""
 
 
 def feet_of(urdf: str, frame: Frame) -> list[tuple[float, ...]]:
@@ -117,6 +123,7 @@ def test_explicit_z_up_overrides_the_check() -> None:
         (HEXAPOD, False),
         *((radial_robot(legs, 0.3), False) for legs in (3, 4, 5, 6, 8)),
         (radial_robot(4), False),
+        (CENTAUR, False),
     ],
 )
 def test_a_robot_that_faces_y_is_made_with_a_warning(urdf: str, warned: bool) -> None:

@@ -144,7 +144,7 @@ def test_a_urdf_is_simulated_and_submitted(
     assert [scenario["name"] for scenario in spec["scenarios"]] == ["slow", "fast"]
 
 
-def test_a_robot_with_surplus_joints_is_made_with_hints(
+def test_a_robot_with_surplus_joints_and_named_servos_is_made_and_submitted(
     server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
     (tmp_path / "dog.urdf").write_text(UNEVEN, encoding="utf-8")
@@ -166,3 +166,11 @@ def test_a_robot_with_surplus_joints_is_made_with_hints(
     expect(results).to_contain_text("dog: 4 legs, 12 joints, 14.50 kg")
     expect(results).to_contain_text("FL_toe_joint at 0.1 rad")
     expect(page.get_by_label("Text of robot.toml")).to_have_value(re.compile("Dynamixel MX-64"))
+    open_advanced(page)
+    page.get_by_label("Particles").fill("2")
+    page.get_by_label("Iterations").fill("1")
+    page.get_by_role("button", name="Submit the job").click()
+    expect(page).to_have_url(re.compile(r"/jobs/(?!new)[^/?]+$"))
+    spec = server.job(page.url.rsplit("/", 1)[1])["spec"]
+    assert spec["controller"] == "servo" and spec["variables"][0]["name"] == "P"
+    assert spec["robot"]["toml"].count("[actuators.mx64.servo]") == 1

@@ -58,7 +58,10 @@ def commands() -> Iterator[str]:
 
 
 def _commands(command: Any, path: str = "gaitswarm", parent: Any = None) -> Iterator[str]:
-    context = command.context_class(command, info_name=path.rsplit(maxsplit=1)[-1], parent=parent)
+    name = path.rsplit(maxsplit=1)[-1]
+    context = command.context_class(
+        command, info_name=name, parent=parent, **command.context_settings
+    )
     context.terminal_width = 80
     yield f"\n(command-{path.replace(' ', '-')})=\n{'#' * min(len(path.split()) + 1, 4)} {path}\n"
     yield f"```text\n{command.get_help(context)}\n```"

@@ -56,7 +56,11 @@ class Finished:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    folder = tmp_path_factory.mktemp("finished")
+    """A job that other tests read as well, and add others to its database."""
+    return finish(tmp_path_factory.mktemp("finished"))
+
+
+def finish(folder: Path) -> Finished:
     spec, db = folder / "spec.json", folder / "jobs.db"
     spec.write_text(json.dumps(SMALL_SPEC), encoding="utf-8")
     result = run_command(

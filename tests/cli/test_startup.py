@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ from typer import Context
 
 from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.cli.main import commands
-from tests.cli.conftest import Finished, Gaitswarm
+from tests.cli.conftest import Finished, Gaitswarm, finish
 from tests.examples.processes import COMMAND_LINE, loaded_by, output, start_python
 
 HEAVY = (
@@ -43,8 +44,9 @@ RARE = (
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [["list"], ["status", "{id}"]])
 def test_list_and_status_import_neither_analyses_nor_what_simulates(
-    finished: Finished, command: list[str]
+    tmp_path: Path, command: list[str]
 ) -> None:
+    finished = finish(tmp_path)
     arguments = [part.format(id=finished.id) for part in command] + ["--db", str(finished.db)]
     statements = f"from gaitswarm.cli.main import run; assert run({arguments}) == 0"
     assert loaded_by(statements, RARE) == set()

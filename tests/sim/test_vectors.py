@@ -87,13 +87,17 @@ def source(precision: Precision) -> str:
     return "#define SINGLE\n" * (precision == "single") + vector_header() + FUNCTIONS
 
 
-def call(aim: Target, name: str, *inputs: Reals, results: int) -> Reals:
-    """What one of `FUNCTIONS` gives, (n, results), compiled for a target."""
+RESULTS = {"fused": 3, "others": 9}
+"""Of each function."""
+
+
+def call(aim: Target, name: str, *inputs: Reals) -> Reals:
+    """What one of `FUNCTIONS` gives, (n, RESULTS), compiled for a target."""
     kind = inputs[0].dtype
     text = source("single" if kind == np.float32 else "double")
     library = load_library("vectors", text.encode(), lambda: text, compile_for=aim)
     assert library is not None
-    output = np.empty((len(inputs[0]), results), dtype=kind)
+    output = np.empty((len(inputs[0]), RESULTS[name]), dtype=kind)
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*inputs, output)]
     getattr(library, f"gaitswarm_{name}")(*pointers, ctypes.c_int64(len(output)))
     return output
@@ -184,7 +188,7 @@ def test_products_and_sums_are_rounded_once(precision: Precision) -> None:
     columns = triples(precision)
     expected = expected_of_fused(columns)
     for aim in HERE:
-        found = call(aim, "fused", *columns, results=3)
+        found = call(aim, "fused", *columns)
         wrong = np.flatnonzero((bits(found) != bits(expected)).any(axis=1))
         rows = [([float(x[k]) for x in columns], found[k], expected[k]) for k in wrong[:3]]
         assert (aim, len(wrong), rows) == (aim, 0, [])
@@ -197,7 +201,7 @@ def test_of_a_nan_or_two_zeros_the_second_operand_is_the_larger_and_the_smaller(
 ) -> None:
     pairs = list(itertools.product(specials(precision), repeat=2))
     a, b = (np.array(side, dtype=TYPES[precision]) for side in zip(*pairs, strict=True))
-    larger, smaller = call(aim, "others", a, b, results=9)[:, :2].T
+    larger, smaller = call(aim, "others", a, b)[:, :2].T
     np.testing.assert_array_equal(bits(larger), bits(np.where(a > b, a, b)))
     np.testing.assert_array_equal(bits(smaller), bits(np.where(a < b, a, b)))
 
@@ -205,11 +209,9 @@ def test_of_a_nan_or_two_zeros_the_second_operand_is_the_larger_and_the_smaller(
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_every_target_gives_the_bits_of_the_widest(precision: Precision) -> None:
     a, b, _ = triples(precision)
-    widest = bits(call(target(), "others", a, b, results=9))
+    widest = bits(call(target(), "others", a, b))
     for aim in HERE:
-        np.testing.assert_array_equal(
-            bits(call(aim, "others", a, b, results=9)), widest, err_msg=str(aim)
-        )
+        np.testing.assert_array_equal(bits(call(aim, "others", a, b)), widest, err_msg=str(aim))
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
@@ -218,7 +220,7 @@ def test_powers_are_accurate_and_zero_stays_about_zero(precision: Precision) -> 
     a = np.concatenate([np.linspace(0.0, 20.0, 401), np.geomspace(1e-6, 1e3, 100)]).astype(kind)
     for exponent in (0.25, 0.84, 3.0, 8.7):
         b = np.full_like(a, exponent)
-        *_, exponential, power = call(target(), "others", a, b, results=9).T
+        *_, exponential, power = call(target(), "others", a, b).T
         wide, steep = a.astype(np.float64), b.astype(np.float64)
         kept = wide < 80.0
         np.testing.assert_allclose(exponential[kept], np.exp(wide[kept]), rtol=accuracy)

@@ -95,11 +95,10 @@ def _inertia(moment: float) -> str:
     return f'<inertia {moments} ixy="0" ixz="0" iyz="0"/></inertial></link>'
 
 
-def swing(robot: Robot, desired: Floats, p: float, start: float = 0.0) -> Floats:
-    """Angles [rad] of the pendulum at every control tick, for desired ones (T,) and a servo's P."""
+def swing(robot: Robot, desired: Floats, law: ControlLaw) -> Floats:
+    """Angles [rad] of the pendulum at every control tick, for desired ones (T,)."""
     coding, timestep = control_steps(robot, 10_000)
     kernel, n = kernel_of(robot), robot.n_joints
-    angles = np.array([start, *[0.0] * (n - 1)])
     parameters = pack_parameters(robot, SCENARIOS[0].model_copy(update={"load": 0.0}), timestep)
     at = Layout(robot).slices
     parameters[at["gravity"]] = [0.0, 0.0, -GRAVITY]
@@ -107,11 +106,11 @@ def swing(robot: Robot, desired: Floats, p: float, start: float = 0.0) -> Floats
     codes = np.zeros((len(desired), n), dtype=np.int32)
     codes[:, 0] = np.rint(desired * coding.angle_counts)
     setup = WalkSetup(
-        start=np.array([0.0, 0.0, 1e3, 0.0, 0.0, 0.0, 1.0, *angles]),
+        start=np.array([0.0, 0.0, 1e3, 0.0, 0.0, 0.0, 1.0, *[0.0] * n]),
         internal_state=np.zeros(internal_state_size(robot)),
         parameters=parameters,
         desired=codes,
-        control_law=ControlLaw(servo=p),
+        control_law=law,
         fall_height=0.0,
         cycle=len(desired),
         shove_ticks=(0, len(desired)),

@@ -91,7 +91,7 @@ def test_a_servo_moves_a_pendulum_as_in_bam(
 ) -> None:
     """Coulomb and viscous friction alone (BAM's M1) would be off by 0.025 to 0.1 rad."""
     robot = bench(actuator, volts, pendulum)
-    mine = swing(robot, TRAJECTORIES[trajectory](times()), p)
+    mine = swing(robot, TRAJECTORIES[trajectory](times()), ControlLaw(servo=p))
     np.testing.assert_allclose(mine[250:2750:250], angles, rtol=0.0, atol=0.003)
 
 

@@ -27,6 +27,7 @@ from gaitswarm.sim.proposal.drive import (
     propose_sole,
     proposed_control,
     quoted,
+    weak_actuators,
 )
 from gaitswarm.sim.proposal.formats import as_urdf
 from gaitswarm.sim.proposal.frame import (
@@ -264,6 +265,7 @@ def propose_robot(
     if frame.forward is None and sideways(legs, stance.angles):
         notes.append(_SIDEWAYS)
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.end.notes]
+    notes += weak_actuators(tree, joints, legs, stance, drives)
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes += [
         *([] if hints.actuators else [ACTUATOR_NOTES[kind]]),

@@ -12,6 +12,7 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
@@ -90,11 +91,7 @@ def propose_drives(
     joints = {joint.name: joint for joint in urdf.joints}
     if actuators:
         return _listed_drives(names, actuators)
-    force = urdf.total_mass * GRAVITY / (len(legs) / 2.0)
-    needs = []
-    for leg, angles in zip(legs, stance.angles, strict=True):
-        _, slopes = leg.feet(np.array([angles]))
-        needs.append(np.abs(slopes[0, 2, :]) * force)
+    needs = _standing_torques(urdf, legs, stance)
     # In motion any joint of a leg may need what its worst one needs at rest.
     worst = np.maximum(np.max(needs, axis=0), 0.5 * np.max(needs))
     share = urdf.total_mass / len(legs)
@@ -104,6 +101,34 @@ def propose_drives(
             for name, need in zip(of_leg, worst, strict=True)
         ]
         for of_leg, leg in zip(names, legs, strict=True)
+    ]
+
+
+def _standing_torques(urdf: Urdf, legs: Sequence[ChainLeg], stance: Stance) -> list[Floats]:
+    """Torques of each leg's joints when half the legs carry the robot [N m]."""
+    force = urdf.total_mass * GRAVITY / (len(legs) / 2.0)
+    slopes = [leg.feet(np.array([at]))[1] for leg, at in zip(legs, stance.angles, strict=True)]
+    return [np.abs(slope[0, 2, :]) * force for slope in slopes]
+
+
+def weak_actuators(
+    urdf: Urdf,
+    names: Sequence[Sequence[str]],
+    legs: Sequence[ChainLeg],
+    stance: Stance,
+    drives: Sequence[Sequence[DriveNumbers]],
+) -> list[str]:
+    """Return a warning for each listed actuator whose motor cannot carry the robot."""
+    worst: dict[str, tuple[float, str, float]] = {}
+    needs = _standing_torques(urdf, legs, stance)
+    for joints, torques, of_leg in zip(names, needs, drives, strict=True):
+        for joint, need, drive in zip(joints, torques.tolist(), of_leg, strict=True):
+            if drive.listed and need > max(drive.torque, worst.get(drive.listed, (0.0,))[0]):
+                worst[drive.listed] = need, joint, drive.torque
+    return [
+        f"warning: {name} is too weak: standing on half the legs takes {need:.2g} N m at {joint},"
+        f" its motor has {torque:.2g} N m; choose another actuator, or correct the mass (`--mass`)"
+        for name, (need, joint, torque) in worst.items()
     ]
 
 

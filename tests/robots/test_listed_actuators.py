@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,14 @@ def test_servos_of_different_voltages_share_the_lowest() -> None:
 def test_unusable_names_are_refused_with_the_remedy(actuators: dict[str, str], said: str) -> None:
     with pytest.raises(RobotFileError, match=said):
         made_with(actuators)
+
+
+def test_an_actuator_that_cannot_carry_the_robot_is_said_to_be_too_weak() -> None:
+    robot = made_with({"*": "mx106", "*_calf_joint": "xl320"})
+    (warning,) = (guess for guess in robot.description.guesses if "too weak" in guess)
+    assert re.match(
+        r"warning: xl320 is too weak: .* N m at \w+_calf_joint, .* has 0.24 N m", warning
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.controllers import ControlLaw
+from gaitswarm.sim.controllers.base import JointPd
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.firmware.folder import check_drives_by_pwm
 from gaitswarm.sim.kernel.control_tick import InnerLoop
@@ -44,21 +45,28 @@ FRICTIONS = [
     ("xl330", -0.27, 0.38, 0.2, 0.11290903),
 ]
 
-HEAVY, LIGHT = Pendulum(1.0, 0.2, 0.15), Pendulum(0.15, 0.03, 0.1)
+HEAVY, LIGHT, LONG = Pendulum(1.0, 0.2, 0.15), Pendulum(0.15, 0.03, 0.1), Pendulum(8.0, 1.0, 0.4)
+
+EROB = ControlLaw(joint_pd=JointPd(4.89677 * 25.0, 4.89677 * 5.0))
+"""BAM's law of eRobs at 25 A/rad and a damping of 1."""
 
 SWINGS = [
-    # actuator, volts, pendulum, trajectory, P; angles [rad] each half second, from 0.5 s on
+    # actuator, volts, pendulum, trajectory, law; angles [rad] each half second, from 0.5 s on
     (
-        *("mx64", 15.0, HEAVY, "sin_sin", 32.0),
+        *("mx64", 15.0, HEAVY, "sin_sin", ControlLaw(servo=32.0)),
         [0.9645, 0.7787, 1.6109, 1.5455, 1.0319, 0.1371, -0.7998, -0.7219, -1.5718, -1.4134],
     ),
     (
-        *("mx64", 15.0, HEAVY, "up_and_down", 8.0),
+        *("mx64", 15.0, HEAVY, "up_and_down", ControlLaw(servo=8.0)),
         [0.0567, 0.2804, 0.5886, 0.9155, 1.1878, 1.3132, 1.3135, 1.3135, 1.3135, 1.2776],
     ),
     (
-        *("xl330", 7.5, LIGHT, "up_and_down", 400.0),
+        *("xl330", 7.5, LIGHT, "up_and_down", ControlLaw(servo=400.0)),
         [0.0718, 0.3032, 0.6179, 0.9494, 1.2243, 1.3536, 1.3548, 1.3548, 1.326, 1.2518],
+    ),
+    (
+        *("erob80-50", 48.0, LONG, "up_and_down", EROB),
+        [0.0677, 0.3047, 0.6064, 0.9124, 1.157, 1.2589, 1.2589, 1.2589, 1.2146, 1.1442],
     ),
 ]
 
@@ -85,13 +93,18 @@ def test_friction_has_the_limit_of_bam(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("actuator", "volts", "pendulum", "trajectory", "p", "angles"), SWINGS)
+@pytest.mark.parametrize(("actuator", "volts", "pendulum", "trajectory", "law", "angles"), SWINGS)
 def test_a_servo_moves_a_pendulum_as_in_bam(
-    actuator: str, volts: float, pendulum: Pendulum, trajectory: str, p: float, angles: list[float]
+    actuator: str,
+    volts: float,
+    pendulum: Pendulum,
+    trajectory: str,
+    law: ControlLaw,
+    angles: list[float],
 ) -> None:
     """Coulomb and viscous friction alone (BAM's M1) would be off by 0.025 to 0.1 rad."""
     robot = bench(actuator, volts, pendulum)
-    mine = swing(robot, TRAJECTORIES[trajectory](times()), ControlLaw(servo=p))
+    mine = swing(robot, TRAJECTORIES[trajectory](times()), law)
     np.testing.assert_allclose(mine[250:2750:250], angles, rtol=0.0, atol=0.003)
 
 

@@ -74,6 +74,18 @@ export function useResource<T>(
   return { data: state.data, error: state.error, loading: state.loading, reload }
 }
 
+/** State of a command: whether it runs, and its error. */
+export function useCommand() {
+  const [busy, setBusy] = useState(false)
+  const [error, setError] = useState<unknown>(null)
+  const during = (work: Promise<unknown>) => {
+    setBusy(true)
+    setError(null)
+    work.catch(setError).finally(() => setBusy(false))
+  }
+  return { busy, error, setError, during }
+}
+
 /** Call `tick` every `milliseconds` while the tab is visible, and as soon as it becomes visible. */
 export function usePolling(tick: () => void, milliseconds: number, active = true): void {
   const latest = useRef(tick)

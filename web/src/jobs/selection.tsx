@@ -2,6 +2,7 @@
 
 import { useState } from 'preact/hooks'
 import { get, patch, remove } from '../api/client'
+import { useCommand } from '../api/resource'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { idsOf } from '../router/query-value'
@@ -45,14 +46,8 @@ interface SelectionProps {
 }
 
 export function Selection({ selected, query, more, onDone, onSelect }: SelectionProps) {
-  const [error, setError] = useState<unknown>(null)
+  const { busy, error, during } = useCommand()
   const [done, setDone] = useState<Done | null>(lastDeletion)
-  const [busy, setBusy] = useState(false)
-  const during = (work: Promise<void>) => {
-    setError(null)
-    setBusy(true)
-    work.catch(setError).finally(() => setBusy(false))
-  }
   const run = async (verb: Verb, ids: readonly string[]) => {
     const { changed, refused } = await changeAll(ids, SEND[verb])
     setDone({ verb, ids: changed, refused })

@@ -1,24 +1,19 @@
 /** Button that submits a search for preferences around a tuning job. */
 
-import { useState } from 'preact/hooks'
 import { post } from '../../api/client'
+import { useCommand } from '../../api/resource'
 import type { Job, JobSpec, PreferencesSpec } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
 import { navigate } from '../../router/navigation'
 import { jobPath } from '../../router/routes'
 
 export function SearchButton({ job }: { job: Job }) {
-  const [error, setError] = useState<unknown>(null)
-  const [sending, setSending] = useState(false)
-  const submit = () => {
-    setSending(true)
-    post('/v1/jobs', { body: searchAround(job) })
-      .then(({ id }) => navigate(jobPath(id)), setError)
-      .finally(() => setSending(false))
-  }
+  const { busy, error, during } = useCommand()
+  const submit = () =>
+    during(post('/v1/jobs', { body: searchAround(job) }).then(({ id }) => navigate(jobPath(id))))
   return (
     <>
-      <button type="button" class="compact" disabled={sending} onClick={submit}>
+      <button type="button" class="compact" disabled={busy} onClick={submit}>
         Search for preferences
       </button>
       {error !== null && <ErrorNotice what="Could not submit the search." error={error} />}

@@ -1,7 +1,7 @@
 /** Command that queues a certificate of a job's best design. */
 
-import { useState } from 'preact/hooks'
 import { patch, post } from '../../api/client'
+import { useCommand } from '../../api/resource'
 import type { Job, JobSpec } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
 import { placeWord } from '../../format/place'
@@ -15,24 +15,16 @@ export function certificateNote({ id, best }: Job): string | null {
 
 /** Queue a certificate of the best design, in the job's scenarios, and show it. */
 export function CertifyButton({ job, primary = false }: { job: Job; primary?: boolean }) {
-  const [busy, setBusy] = useState(false)
-  const [error, setError] = useState<unknown>(null)
+  const { busy, error, during } = useCommand()
   const certify = async () => {
-    setBusy(true)
-    setError(null)
-    try {
-      const { robot, controller, scenarios, preference } = job.spec as JobSpec
-      const design = { ...job.best!.design }
-      const name = `certificate of ${job.name || job.id}`
-      const spec = { kind: 'certificate', name, robot, controller, design, scenarios, preference }
-      const { id } = await post('/v1/jobs', { body: spec as never })
-      const body = { note: certificateNote(job) }
-      await patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })
-      navigate(jobPath(id))
-    } catch (problem) {
-      setError(problem)
-      setBusy(false)
-    }
+    const { robot, controller, scenarios, preference } = job.spec as JobSpec
+    const design = { ...job.best!.design }
+    const name = `certificate of ${job.name || job.id}`
+    const spec = { kind: 'certificate', name, robot, controller, design, scenarios, preference }
+    const { id } = await post('/v1/jobs', { body: spec as never })
+    const body = { note: certificateNote(job) }
+    await patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })
+    navigate(jobPath(id))
   }
   return (
     <>
@@ -41,7 +33,7 @@ export function CertifyButton({ job, primary = false }: { job: Job; primary?: bo
         class={primary ? 'primary' : ''}
         title="Simulate the best design in 1000 worlds with other friction, masses and sensors"
         disabled={busy}
-        onClick={certify}
+        onClick={() => during(certify())}
       >
         Certify
       </button>

@@ -4,6 +4,7 @@ import { useEffect, useState } from 'preact/hooks'
 import { get, post, put, remove } from '../../api/client'
 import { isReadable } from '../../api/jobs'
 import { isOffline } from '../../api/problem'
+import { useCommand } from '../../api/resource'
 import type { StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
 import { CopyLink } from '../../components/copy-button'
@@ -26,15 +27,12 @@ interface JobActionsProps {
 
 export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
   const [dialog, setDialog] = useState<Dialog>(null)
-  const [busy, setBusy] = useState(false)
-  const [error, setError] = useState<unknown>(null)
+  const { busy, error, setError, during: run } = useCommand()
   // The job was loaded again: the connection is back.
   useEffect(() => setError((shown: unknown) => (isOffline(shown) ? null : shown)), [job])
   const during = (work: Promise<void>) => {
-    setBusy(true)
-    setError(null)
     setDialog(null)
-    work.catch(setError).finally(() => setBusy(false))
+    run(work)
   }
   const command = (send: () => Promise<StoredJob>) => during(send().then(onJob))
   const deleteJob = async () => {

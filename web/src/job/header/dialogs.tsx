@@ -3,7 +3,7 @@
 import { useState } from 'preact/hooks'
 import { get, patch, post, put } from '../../api/client'
 import { ApiProblem } from '../../api/problem'
-import { useResource } from '../../api/resource'
+import { useCommand, useResource } from '../../api/resource'
 import type { Job, StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
 import { ErrorNotice } from '../../components/feedback'
@@ -159,8 +159,7 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
   const [preference, setPreference] = useState(AS_PARENT)
   const [method, setMethod] = useState(AS_PARENT)
   const [measure, setMeasure] = useState(() => measureIn(job))
-  const [sending, setSending] = useState(false)
-  const [error, setError] = useState<unknown>(null)
+  const { busy, error, during } = useCommand()
   const preferences = useResource('preferences', (signal) => get('/v1/preferences', { signal }))
   const optimizers = useResource('optimizers', (signal) => get('/v1/optimizers', { signal }))
   const start = Number(first)
@@ -172,8 +171,6 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
   const last = formatCount(job.iterations)
   const changed = (value: string) => (value === AS_PARENT ? null : value)
   const fork = () => {
-    setSending(true)
-    setError(null)
     const body = {
       from_iteration: start,
       iterations: budget.iterations,
@@ -184,14 +181,13 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
       optimizer: changed(method) as 'pso' | null,
       ...changesOf(measure, measureIn(job), job.scenarios),
     }
-    post('/v1/jobs/{job_id}/fork', { path: { job_id: job.id }, body })
-      .then((forked) => navigate(jobPath(forked.id)), setError)
-      .finally(() => setSending(false))
+    const forked = post('/v1/jobs/{job_id}/fork', { path: { job_id: job.id }, body })
+    during(forked.then(({ id }) => navigate(jobPath(id))))
   }
   return (
     <ConfirmDialog
       title="Fork the job"
-      disabled={!valid || sending}
+      disabled={!valid || busy}
       onConfirm={fork}
       onDismiss={onDismiss}
     >

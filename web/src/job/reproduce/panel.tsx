@@ -2,7 +2,7 @@
 
 import { useState } from 'preact/hooks'
 import { get, post, url } from '../../api/client'
-import { useResource } from '../../api/resource'
+import { useCommand, useResource } from '../../api/resource'
 import type { HistoryVerification, Job } from '../../api/types'
 import { Card } from '../../components/card'
 import { CopyBlock, CopyButton } from '../../components/copy-button'
@@ -206,15 +206,9 @@ function Digest({ digits, shown = 8 }: { digits: string; shown?: number }) {
 
 function HistoryCheck({ id, head }: { id: string; head: string }) {
   const [verification, setVerification] = useState<HistoryVerification | null>(null)
-  const [busy, setBusy] = useState(false)
-  const [error, setError] = useState<unknown>(null)
-  const verify = () => {
-    setBusy(true)
-    setError(null)
-    post('/v1/jobs/{job_id}/verify', { path: { job_id: id }, body: { replay: 0 } })
-      .then(setVerification, setError)
-      .finally(() => setBusy(false))
-  }
+  const { busy, error, during } = useCommand()
+  const options = { path: { job_id: id }, body: { replay: 0 } }
+  const verify = () => during(post('/v1/jobs/{job_id}/verify', options).then(setVerification))
   return (
     <div class="stack-tight" data-head={head}>
       <div class="row">

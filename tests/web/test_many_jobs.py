@@ -12,6 +12,7 @@ from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import choose
 from tests.web.test_certificate import CERTIFICATE
+from tests.web.test_views import AXE, RUN_AXE
 from tests.web.visit import Visit, show_tab_again
 
 pytestmark = pytest.mark.slow
@@ -55,6 +56,42 @@ def test_filters_order_and_search_are_in_the_address(
     expect(page.locator("th[aria-sort]")).to_have_attribute("aria-sort", "descending")
     page.get_by_label("Search by name, id, note or tag").fill(fuzzy)
     expect(page.locator("[data-job]")).to_have_count(1)
+
+
+def test_a_view_of_the_list_is_saved_applied_and_removed(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    server.submit(SMALL_JOB)
+    pi = server.submit(SMALL_JOB | {"name": "gains", "controller": "pi"})
+    visited = visit(server.url, bypass_csp=True)
+    page = visited.go("/jobs")
+    expect(page.locator("[data-job]")).to_have_count(2)
+    views = page.get_by_role("navigation", name="Saved views")
+    expect(views).to_have_count(0)
+    page.get_by_label("Controller", exact=True).select_option("pi")
+    page.get_by_label("Order").select_option("name")
+    views.get_by_label("Name of the view").fill("gains by name")
+    page.keyboard.press("Enter")
+    link = views.get_by_role("link", name="gains by name")
+    expect(link).to_have_attribute("aria-current", "page")
+    expect(views.get_by_role("button", name="Save view")).to_have_count(0)
+    page.add_script_tag(path=AXE)
+    assert page.evaluate(RUN_AXE) == []
+
+    visited.go("/jobs")
+    expect(page.locator("[data-job]")).to_have_count(2)
+    link.click()
+    expect(page).to_have_url(re.compile("controller=pi&order=name$"))
+    expect(page.locator("[data-job]")).to_have_count(1)
+    assert rows(page) == [pi]
+
+    page.get_by_role("button", name="Remove view gains by name").press("Enter")
+    expect(link).to_have_count(0)
+    expect(views).to_be_focused()
+    visited.go("/jobs")
+    expect(page.locator("[data-job]")).to_have_count(2)
+    expect(views).to_have_count(0)
 
 
 def test_several_jobs_are_deleted_and_restored_and_refusals_explained(

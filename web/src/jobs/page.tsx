@@ -29,6 +29,7 @@ import {
   reordered,
   STATES,
 } from './list-query'
+import { SavedViews } from './saved-views'
 import { jobsInWords, Selection, useSelected } from './selection'
 import { useSparklines } from './sparkline'
 import './jobs.css'
@@ -79,6 +80,7 @@ export function JobsPage() {
             <Filters query={query} facets={facets}>
               {countWords(facets, filtered, jobs.length, page.next, cursors.length)}
             </Filters>
+            <SavedViews query={place.query} />
             <Selection
               selected={selected}
               query={query}

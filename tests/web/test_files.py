@@ -100,6 +100,9 @@ def test_parallel_coordinates_export_every_design(
     expect(page.get_by_role("menu")).to_have_count(0)
 
 
+SENSITIVITY = "Sensitivity of the fitness"
+
+
 @pytest.mark.thorough("test_a_chart_is_exported_as_numbers_and_pictures")
 def test_limiting_factors_are_exported_with_column_names(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
@@ -120,4 +123,11 @@ def test_limiting_factors_are_exported_with_column_names(
     values = {(row["Scenario"], row["Objective"]): float(row["Value"]) for row in rows}
     assert {scenario for scenario, _ in values} == set(expected)
     for (scenario, objective), value in values.items():
-        assert value == expected[scenario]["objectives"][objective.replace(" ", "_")]
+        objectives = expected[scenario]["objectives"]
+        if objective == "speed":
+            assert value == 1.0 / objectives["reciprocal_speed"]
+        else:
+            assert value == objectives[objective.replace(" ", "_")]
+    assert {row["Unit"] for row in rows if row["Objective"] == "speed"} == {"m/s"}
+    sensitivities = {row["Objective"]: float(row[SENSITIVITY]) for row in rows}
+    assert sensitivities["speed"] <= 0.0 <= sensitivities["energy"]

@@ -255,6 +255,8 @@ def test_scenarios_are_compared_with_the_reference_of_the_job_by_speed(
     table = page.get_by_role("table", name="Objectives of the winner by scenario")
     heads = table.locator("thead th")
     expect(heads).to_contain_text(["speed [m/s]"])
+    limits = page.get_by_role("region", name="Limiting factors", exact=True)
+    expect(limits.get_by_role("columnheader", name="Speed")).to_be_visible()
     column = heads.all_inner_texts().index("speed [m/s]")
     for name, result in job["best"]["scenarios"].items():
         cell = table.locator("tbody tr", has_text=name).locator("th, td").nth(column)

@@ -48,7 +48,7 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed(
     shown = page.locator("[data-front]")
     expect(shown).to_have_attribute("data-front", str(front["size"]))
     expect(page.get_by_role("img", name=SCATTER)).to_have_attribute(
-        "aria-label", re.compile(rf"^{len(front['designs'])} .* reciprocal speed and acceleration$")
+        "aria-label", re.compile(rf"^{len(front['designs'])} .* time per metre and acceleration$")
     )
     page.get_by_label("Across").select_option("energy")
     expect(page).to_have_url(re.compile("x=energy"))

@@ -282,6 +282,9 @@ def test_the_robot_stays_in_view_and_its_figures_are_compared_with_the_baseline(
     tone = "better" if slowness[0] < slowness[1] else "worse"
     speed = figures.locator("div").filter(has_text="Speed").locator(".judged")
     expect(speed).to_have_attribute("data-tone", tone)
+    row = page.get_by_role("table", name="Objectives of the walk").locator("tr", has_text="speed")
+    expect(row).to_contain_text(f"{1 / slowness[0]:#.4g}")
+    expect(row).to_contain_text("m/s")
 
     page.get_by_role("region", name="Objectives", exact=True).scroll_into_view_if_needed()
     expect(canvas).to_be_in_viewport(ratio=0.5)

@@ -15,7 +15,7 @@ from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
 
-OBJECTIVES = ("torque", "acceleration", "angular acceleration", "energy", "reciprocal speed")
+OBJECTIVES = ("torque", "acceleration", "angular acceleration", "energy", "time per metre")
 
 
 @pytest.mark.thorough("test_another_preference_ranks_the_history_without_simulation")
@@ -45,6 +45,7 @@ def test_the_preference_of_chapter_3_weights_a_sixth_objective(
     spec = server.job(page.url.rpartition("/")[2])["spec"]
     assert spec["preference"]["bias"] == [0.0] * 5 + [0.03]
     assert (spec["optimizer"]["inertia_end"], spec["optimizer"]["particles"]) == (0.7, 8)
+    page.get_by_role("link", name="Details").click()
     expect(page.get_by_text("Figure of merit F (eq. 3.1)")).to_be_visible(timeout=30_000)
 
 

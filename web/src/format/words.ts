@@ -1,8 +1,8 @@
 /** Text formatting of API names and messages. */
 
-/** `angular_acceleration` -> `angular acceleration`. */
+/** `angular_acceleration` -> `angular acceleration`; the reciprocal speed has a name of its own. */
 export function inWords(name: string): string {
-  return name.replaceAll('_', ' ')
+  return name.replaceAll('reciprocal_speed', 'time per metre').replaceAll('_', ' ')
 }
 
 export function capitalized(text: string): string {

@@ -6,6 +6,7 @@ import { BrokenName } from '../components/text'
 import { type Place, placeWord } from '../format/place'
 import { inWords } from '../format/words'
 import { jobPath, withQuery } from '../router/routes'
+import { amountOf, quantityOf, type WithObjectives } from './quantity'
 
 /** A row's name, which may wrap after underscores. */
 export const VARIABLE: Column<{ readonly name: string }> = {
@@ -40,16 +41,12 @@ export function designColumn(job: Job, header = false): Column<Place> {
   }
 }
 
-interface WithObjectives {
-  readonly objectives: Readonly<Record<string, number | null>>
-}
-
 export function objectiveColumns(objectives: readonly Objective[]): Column<WithObjectives>[] {
-  return objectives.map(({ name, unit }) => ({
-    key: name,
-    label: inWords(name),
-    unit,
+  return objectives.map(quantityOf).map((shown) => ({
+    key: shown.name,
+    label: inWords(shown.name),
+    unit: shown.unit,
     digits: 4,
-    value: (row) => row.objectives[name] ?? null,
+    value: (row) => amountOf(row, shown),
   }))
 }

@@ -1,6 +1,9 @@
 /** Objectives as they are shown: the speed in place of its reciprocal. */
 
-import type { ScenarioResult } from '../api/types'
+export interface WithObjectives {
+  readonly objectives: Readonly<Record<string, number | null>>
+  readonly measurements?: Readonly<Record<string, number | null>>
+}
 
 export interface Quantity {
   readonly name: string
@@ -17,11 +20,11 @@ export function quantityOf({ name, unit }: Omit<Quantity, 'more'>): Quantity {
 
 /** Value of a quantity; null if it is unknown. */
 export function amountOf(
-  result: Pick<ScenarioResult, 'objectives'> | null | undefined,
+  result: WithObjectives | null | undefined,
   { name }: Pick<Quantity, 'name'>,
 ): number | null {
-  const { objectives = {} } = result ?? {}
-  if (name !== 'speed') return objectives[name] ?? null
+  const { objectives = {}, measurements = {} }: Partial<WithObjectives> = result ?? {}
+  if (name !== 'speed') return objectives[name] ?? measurements[name] ?? null
   const slowness = objectives.reciprocal_speed
   return slowness ? 1 / slowness : null
 }

@@ -5,13 +5,7 @@ import { amountOf, MARKS } from '../job/quantity'
 import type { Recorded, Replay } from './replay/replay'
 import { peakOf, slipPerMetre } from './replay/support'
 
-interface Figure {
-  readonly label: string
-  readonly unit: string
-  readonly better: 'more' | 'less'
-  readonly value: number | null
-  readonly note?: string
-}
+type Figure = readonly [label: string, unit: string, value: number | null, note?: string | null]
 
 function figuresOf(replay: Replay): readonly Figure[] {
   const { objectives, robot, gravity, load_kg } = replay.header
@@ -22,28 +16,11 @@ function figuresOf(replay: Replay): readonly Figure[] {
   const ofLimit = (peak: typeof current, limit: string) =>
     peak && `${percent(peak.share, 2)} of ${limit}`
   return [
-    {
-      label: 'Speed',
-      unit: 'm/s',
-      better: 'more',
-      value: amountOf({ objectives }, { name: 'speed' }),
-    },
-    { label: 'Cost of transport', unit: '1', better: 'less', value: energy && energy / weight },
-    {
-      label: 'Peak current',
-      unit: 'A',
-      better: 'less',
-      value: current && current.peak,
-      note: ofLimit(current, 'stall') ?? undefined,
-    },
-    {
-      label: 'Peak gear torque',
-      unit: 'N m',
-      better: 'less',
-      value: torque && torque.peak,
-      note: ofLimit(torque, 'nominal') ?? undefined,
-    },
-    { label: 'Slip', unit: 'm/m', better: 'less', value: slipPerMetre(replay) },
+    ['Speed', 'm/s', amountOf({ objectives }, { name: 'speed' })],
+    ['Cost of transport', '1', energy && energy / weight],
+    ['Peak current', 'A', current && current.peak, ofLimit(current, 'stall')],
+    ['Peak gear torque', 'N m', torque && torque.peak, ofLimit(torque, 'nominal')],
+    ['Slip', 'm/m', slipPerMetre(replay)],
   ]
 }
 
@@ -52,13 +29,13 @@ export function WalkFigures({ walks }: { walks: readonly Recorded[] }) {
   const [figures, baseline] = walks.map(({ replay }) => figuresOf(replay))
   return (
     <dl class="card walk-figures" data-figures>
-      {figures.map(({ label, unit, better, value, note }, k) => (
+      {figures.map(([label, unit, value, note], k) => (
         <div key={label}>
           <dt>{label}</dt>
           <dd>{quantity(value, unit, 3)}</dd>
           {note && <dd class="muted small">{note}</dd>}
           {baseline && (
-            <Change value={value} from={baseline[k].value} better={better} unit={unit} />
+            <Change value={value} from={baseline[k][2]} more={label === 'Speed'} unit={unit} />
           )}
         </div>
       ))}
@@ -69,16 +46,16 @@ export function WalkFigures({ walks }: { walks: readonly Recorded[] }) {
 interface ChangeProps {
   value: number | null
   from: number | null
-  better: 'more' | 'less'
+  /** Whether more is better. */
+  more: boolean
   unit: string
 }
 
-function Change({ value, from, better, unit }: ChangeProps) {
+function Change({ value, from, more, unit }: ChangeProps) {
   if (value === null || from === null || !(from > 0)) return null
   const relative = value / from - 1
   const same = Math.abs(relative) <= 0.005
-  const isBetter = relative > 0 === (better === 'more')
-  const tone = same ? 'same' : isBetter ? 'better' : 'worse'
+  const tone = same ? 'same' : relative > 0 === more ? 'better' : 'worse'
   return (
     <dd class="judged" data-tone={tone}>
       <b>{MARKS[tone]}</b>{' '}

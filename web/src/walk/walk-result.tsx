@@ -5,6 +5,7 @@ import { type Column, Table } from '../components/table/table'
 import { Unit } from '../components/text'
 import { change, formatNumber, NONE } from '../format/number'
 import { inWords, sentence } from '../format/words'
+import { amountOf, type Quantity, quantityOf } from '../job/quantity'
 import type { Recorded, Replay } from './replay/replay'
 
 const MEANINGS: Readonly<Record<string, string>> = {
@@ -12,7 +13,7 @@ const MEANINGS: Readonly<Record<string, string>> = {
   acceleration: "rms of the body's acceleration",
   angular_acceleration: "rms of the body's angular acceleration",
   energy: 'electrical energy per metre',
-  reciprocal_speed: 'reciprocal of the mean speed',
+  speed: 'mean forward speed',
   height_loss: "body's height at the start minus that at the end",
 }
 
@@ -38,16 +39,16 @@ export function FailureNotices({ walks }: { walks: readonly Recorded[] }) {
 
 export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
   const { objectives, objective_units } = walks[0].replay.header
-  const objectiveOf = (name: string, k: number) => walks[k]?.replay.header.objectives[name] ?? null
+  const amount = (shown: Quantity, k: number) => amountOf(walks[k]?.replay.header, shown)
   const comparing = walks.length > 1
-  const columns: Column<string>[] = [
+  const columns: Column<Quantity>[] = [
     {
       key: 'objective',
       header: true,
-      cell: (name) => (
+      cell: ({ name, unit }) => (
         <>
           {inWords(name)}
-          <Unit unit={objective_units[name]} />
+          <Unit unit={unit} />
           <span class="muted small block">{MEANINGS[name]}</span>
         </>
       ),
@@ -56,20 +57,22 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
       key: `walk-${k}`,
       label: comparing ? label : 'Value',
       numeric: true,
-      cell: (name: string) => formatNumber(objectiveOf(name, k)),
+      cell: (shown: Quantity) => formatNumber(amount(shown, k)),
     })),
     {
       key: 'difference',
       label: `vs. ${walks[1]?.label}`,
       numeric: true,
-      cell: (name) => difference(objective_units[name], objectiveOf(name, 0), objectiveOf(name, 1)),
+      cell: (shown) => difference(shown.unit, amount(shown, 0), amount(shown, 1)),
     },
   ]
   return (
-    <Card title="Objectives" note="Lower is better.">
+    <Card title="Objectives" note="Lower is better, except for the speed.">
       <Table
         caption="Objectives of the walk"
-        rows={Object.keys(objectives)}
+        rows={Object.keys(objectives).map((name) =>
+          quantityOf({ name, unit: objective_units[name] }),
+        )}
         columns={comparing ? columns : columns.slice(0, -1)}
       />
     </Card>

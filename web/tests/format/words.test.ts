@@ -3,6 +3,7 @@ import { capitalized, inWords, sentence } from '../../src/format/words'
 
 test('names are written in words', () => {
   expect(inWords('angular_acceleration')).toBe('angular acceleration')
+  expect(inWords('least reciprocal_speed')).toBe('least time per metre')
   expect(capitalized('error')).toBe('Error')
 })
 

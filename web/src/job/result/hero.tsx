@@ -1,6 +1,6 @@
 /** The result of a tuning job at a glance: verdict, key figures, walk and next step. */
 
-import type { Job, QuantityChange, ScenarioResult, Verdict } from '../../api/types'
+import type { Job, QuantityChange, Verdict } from '../../api/types'
 import { CopyBlock } from '../../components/copy-button'
 import { formatCount, percent, quantity } from '../../format/number'
 import { jobPath, withQuery } from '../../router/routes'
@@ -69,67 +69,37 @@ function headline(job: Job, { reference, share, reason }: Gain): string {
 /** Relative difference up to which two values are the same, as in the API's verdict. */
 const SAME = 0.005
 
-interface Figure {
-  readonly name: string
-  readonly label: string
-  readonly unit: string
-  readonly value: (result: ScenarioResult) => number | null | undefined
-  readonly more: string
-  readonly less: string
-}
-
-const FIGURES: readonly Figure[] = [
-  {
-    name: 'speed',
-    label: 'Speed',
-    unit: 'm/s',
-    value: (result) => amountOf(result, { name: 'speed' }),
-    more: 'faster',
-    less: 'slower',
-  },
-  ...(
-    [
-      ['energy', 'Energy per metre', 'J/m'],
-      ['peak_current', 'Peak current', 'A'],
-      ['torque', 'Torque', 'N m'],
-      ['acceleration', 'Acceleration', 'm/s2'],
-    ] as const
-  ).map(([name, label, unit]) => ({
-    name,
-    label,
-    unit,
-    value: ({ objectives, measurements }: ScenarioResult) =>
-      objectives[name] ?? measurements?.[name],
-    more: 'more',
-    less: 'less',
-  })),
-]
+const FIGURES = [
+  ['speed', 'Speed', 'm/s'],
+  ['energy', 'Energy per metre', 'J/m'],
+  ['peak_current', 'Peak current', 'A'],
+  ['torque', 'Torque', 'N m'],
+  ['acceleration', 'Acceleration', 'm/s2'],
+] as const
 
 /** Five figures of the best design, as means over the scenarios. */
 function Figures({ job, gain }: { job: Job; gain: Gain & { verdict: Verdict | null } }) {
   const results = Object.entries(job.best!.scenarios)
   const count = results.length
   const weights = job.spec.kind === 'tuning' ? job.spec.scenario_weights : undefined
-  const rows = FIGURES.flatMap((figure) => {
-    const compared = gain.verdict?.quantities.find(({ name }) => name === figure.name)
+  const rows = FIGURES.flatMap(([name, label, unit]) => {
+    const compared = gain.verdict?.quantities.find((each) => each.name === name)
     const value = compared
       ? geometricMean(
           Object.entries(compared.scenarios).map(([k, one]) => [one.value, weights?.[k]]),
         )
-      : geometricMean(results.map(([k, one]) => [figure.value(one), weights?.[k]]))
-    return value === null ? [] : [{ ...figure, value, compared }]
+      : geometricMean(results.map(([k, one]) => [amountOf(one, { name }), weights?.[k]]))
+    return value === null ? [] : [{ name, label, unit, value, compared }]
   })
   if (rows.length === 0) return null
   return (
     <div class="hero-figures">
       <dl>
-        {rows.map(({ name, label, unit, value, compared, more, less }) => (
+        {rows.map(({ name, label, unit, value, compared }) => (
           <div key={name} data-figure={name}>
             <dt>{label}</dt>
             <dd>{quantity(value, unit, 3)}</dd>
-            {compared && (
-              <Comparison compared={compared} value={value} unit={unit} words={[more, less]} />
-            )}
+            {compared && <Comparison name={name} compared={compared} value={value} unit={unit} />}
           </div>
         ))}
       </dl>
@@ -142,13 +112,14 @@ function Figures({ job, gain }: { job: Job; gain: Gain & { verdict: Verdict | nu
 }
 
 interface ComparisonProps {
+  name: string
   compared: QuantityChange
   value: number
   unit: string
-  words: readonly [more: string, less: string]
 }
 
-function Comparison({ compared, value, unit, words: [more, less] }: ComparisonProps) {
+function Comparison({ name, compared, value, unit }: ComparisonProps) {
+  const [more, less] = name === 'speed' ? ['faster', 'slower'] : ['more', 'less']
   const { judgement, change: relative } = compared
   const size =
     judgement === 'same'

@@ -15,6 +15,7 @@ import { VARIABLE } from '../columns'
 import { searchedVariables } from '../facts'
 import type { PanelProps } from '../page'
 import { type Analysis, analyse, type Factor } from '../preference'
+import { amountOf, type Quantity, quantityOf } from '../quantity'
 import { ConvergenceChart } from './convergence-chart'
 import { Hero } from './hero'
 import { type WinnerVariable, winnerVariables } from './model'
@@ -163,7 +164,13 @@ function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
   // A stored spec has its presets resolved.
   const analysis = job.best && analyse(job.best.scenarios, spec.preference as Preference)
   if (!analysis) return null
-  const units = new Map(job.objectives.map((o) => [o.name, o.unit]))
+  const shownOf = ({ objective: name, value }: Factor) => {
+    const objective = job.objectives.find((each) => each.name === name)
+    const shown = quantityOf(objective ?? { name, unit: '1' })
+    return { ...shown, amount: amountOf({ objectives: { [name]: value } }, shown) }
+  }
+  // A sensitivity to the objective is the opposite of one to its reciprocal.
+  const sensitivity = (f: Factor) => (shownOf(f).more ? -f.sensitivity : f.sensitivity)
   return (
     <ChartCard
       title="Limiting factors"
@@ -174,9 +181,9 @@ function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
           order={{ column: 'sensitivity', descending: true }}
           columns={[
             { key: 'scenario', header: true, value: (f) => f.scenario },
-            { key: 'objective', value: (f) => inWords(f.objective) },
-            { key: 'value', digits: 4, value: (f) => f.value },
-            { key: 'unit', value: (f) => units.get(f.objective) ?? '1' },
+            { key: 'objective', value: (f) => inWords(shownOf(f).name) },
+            { key: 'value', digits: 4, value: (f) => shownOf(f).amount },
+            { key: 'unit', value: (f) => shownOf(f).unit },
             {
               key: 'contribution to log utility',
               digits: 3,
@@ -185,8 +192,10 @@ function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
             {
               key: 'sensitivity',
               label: 'Sensitivity of the fitness',
-              digits: 3,
+              numeric: true,
               value: (f) => f.sensitivity,
+              data: sensitivity,
+              cell: (f) => formatNumber(sensitivity(f), 3),
             },
           ]}
         />
@@ -194,7 +203,7 @@ function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
     >
       <div class="stack">
         <p data-limit={`${analysis.worstScenario} ${analysis.worstFactor.objective}`}>
-          {explain(analysis, units)}
+          {explain(analysis, shownOf)}
         </p>
         {Object.keys(analysis.utilities).length > 1 && <ContributionTable analysis={analysis} />}
       </div>
@@ -204,11 +213,11 @@ function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
 
 function explain(
   { worstScenario, worstFactor, excess, factors, utilities }: Analysis,
-  units: Map<string, string>,
+  shownOf: (factor: Factor) => Quantity & { amount: number | null },
 ) {
   const steepest = factors.reduce((a, b) => (b.sensitivity > a.sensitivity ? b : a))
-  const value = quantity(worstFactor.value, units.get(worstFactor.objective) ?? '1')
-  const gain = 1 - (1 - 0.1) ** steepest.sensitivity
+  const [worst, best] = [shownOf(worstFactor), shownOf(steepest)]
+  const gain = 1 - (best.more ? 1 / 1.1 : 0.9) ** steepest.sensitivity
   const several = Object.keys(utilities).length > 1
   return (
     <>
@@ -216,11 +225,12 @@ function explain(
         <>
           Scenario <strong>{worstScenario}</strong> limits the winner most: its utility is{' '}
           {formatNumber(excess, 3)} times the geometric mean of all scenarios, mainly because of{' '}
-          <strong>{inWords(worstFactor.objective)}</strong> ({value}).{' '}
+          <strong>{inWords(worst.name)}</strong> ({quantity(worst.amount, worst.unit)}).{' '}
         </>
       )}
-      The most effective improvement is in {inWords(steepest.objective)} of {steepest.scenario}:
-      reducing it by 10&nbsp;% lowers the fitness by about {percent(gain, 2)}.
+      The most effective improvement is in {inWords(best.name)} of {steepest.scenario}:{' '}
+      {best.more ? 'raising' : 'reducing'} it by 10&nbsp;% lowers the fitness by about{' '}
+      {percent(gain, 2)}.
     </>
   )
 }
@@ -241,7 +251,7 @@ function ContributionTable({ analysis: { factors, utilities } }: { analysis: Ana
           { key: 'scenario', header: true, value: (s) => s },
           ...objectives.map((objective) => ({
             key: objective,
-            label: inWords(objective),
+            label: inWords(quantityOf({ name: objective, unit: '1' }).name),
             numeric: true,
             value: (s: string) => contribution(s, objective),
             cell: (s: string) => <Share value={contribution(s, objective)} most={most} />,

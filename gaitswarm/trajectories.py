@@ -43,14 +43,6 @@ class TrajectoriesRequest(ScenariosRequest):
             }
 
 
-class FastJointView(View):
-    """A joint that turns faster than its motor does without load."""
-
-    joint: str = Field(description="Name of the joint.")
-    speed: float = Field(description="Its largest speed [rad/s].")
-    no_load_speed: float = Field(description="Of its motor at the battery's voltage [rad/s].")
-
-
 class ScenarioTrajectoryView(View):
     """Desired angles of a scenario."""
 
@@ -59,7 +51,9 @@ class ScenarioTrajectoryView(View):
     rows: dict[str, int] = Field(description="By part: start, cycle and stop.")
     fastest_joint: str = Field(description="The joint that turns fastest.")
     largest_speed: float = Field(description="Its largest speed [rad/s].")
-    too_fast: list[FastJointView] = Field(description="Joints that cannot follow.")
+    too_fast: dict[str, tuple[float, float]] = Field(
+        description="By joint that cannot follow, its speed and its motor's without load [rad/s]."
+    )
 
 
 class TrajectoriesView(View):
@@ -79,11 +73,7 @@ def _scenario_view(name: str, points: Setpoints) -> ScenarioTrajectoryView:
         rows={part: len(rows) for part, rows in points.parts.items()},
         fastest_joint=fastest,
         largest_speed=largest,
-        too_fast=[
-            FastJointView(joint=joint, speed=speed, no_load_speed=limit)
-            for joint, speed, limit in points.speeds
-            if speed > limit
-        ],
+        too_fast={joint: (speed, top) for joint, speed, top in points.speeds if speed > top},
     )
 
 

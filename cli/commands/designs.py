@@ -419,10 +419,10 @@ def _trajectories(view: TrajectoriesView) -> Parts:
     )
     yield table(["scenario", *heads], rows)
     for of in view.scenarios:
-        for fast in of.too_fast:
+        for joint, (speed, no_load) in of.too_fast.items():
             note(
-                f"warning: {of.scenario}: {fast.joint} turns at {fast.speed:.3g} rad/s,"
-                f" {fast.speed / fast.no_load_speed - 1.0:.0%} faster than its motor without load"
-                f" ({fast.no_load_speed:.3g} rad/s)"
+                f"warning: {of.scenario}: {joint} turns at {speed:.3g} rad/s,"
+                f" {speed / no_load - 1.0:.0%} faster than its motor without load"
+                f" ({no_load:.3g} rad/s)"
             )
     note(f"{len(view.files)} files of {len(view.joints)} joints written to {view.folder}")

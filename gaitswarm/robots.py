@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -54,11 +54,8 @@ from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import mesh_bounds
 from gaitswarm.sim.robot.urdf import unphysical
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
-from gaitswarm.sim.simulate import simulate
+from gaitswarm.sim.simulate import Simulation, simulate
 from gaitswarm.sim.variables import Variable
-
-if TYPE_CHECKING:
-    from gaitswarm.sim.simulate import Simulation
 
 JOB_FILE: Final = "job.json"
 """In a robot's folder: what a job of this robot has unless it says otherwise."""

@@ -61,14 +61,9 @@ def field_errors(errors: Iterable[Mapping[str, Any]], *, prefix: str = "") -> li
     """Return pydantic's errors by field, without repeats."""
     found = []
     for error in errors:
-        if _follows_from_others(error):
-            continue
+        if error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]:
+            continue  # the list is too short without its wrong items
         location = without_tags(error["loc"])
         path = ".".join(str(part) for part in (*([prefix] if prefix else []), *location))
         found.append(FieldErrorView.from_message(path, message_of(error)))
     return list(dict.fromkeys(found))
-
-
-def _follows_from_others(error: Mapping[str, Any]) -> bool:
-    """A list whose items are wrong is then too short as well, though it was not in the input."""
-    return bool(error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"])

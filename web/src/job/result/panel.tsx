@@ -265,8 +265,9 @@ function ContributionTable({ analysis: { factors, utilities } }: { analysis: Ana
         ]}
       />
       <p class="muted small table-note">
-        Each number is e ln((b + f) / geometric mean of b + f over the scenarios). A sum is the
-        logarithm of the scenario’s utility over the geometric mean of all.
+        Each number is e ln((b + f) / geometric mean of b + f over the scenarios), where f of the
+        speed is the time per metre; less is better. A sum is the logarithm of the scenario’s
+        utility over the geometric mean of all.
       </p>
     </div>
   )

@@ -214,7 +214,7 @@ def identify(
 
 
 def _swarm(particles: int) -> dict[str, Any]:
-    """Explore first, then converge: there are many parameters, and one valley."""
+    """Explore first, then converge, for many parameters in a single valley."""
     inertia = {"inertia_start": 0.9, "inertia_end": 0.4}
     return {"name": "pso", "particles": particles, **inertia}
 

@@ -87,7 +87,7 @@ def test_the_page_of_a_missing_job_leads_on(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 404").go("/jobs/none")
-    expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
+    expect(page.get_by_role("heading", name="Job not found")).to_be_visible()
     expect(page.get_by_role("main").get_by_role("link", name="list of jobs")).to_be_visible()
 
 

@@ -95,7 +95,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
           <Loading what="the job" />
         ) : live.missing ? (
           <section class="card">
-            <Empty title="There is no such job" level={1}>
+            <Empty title="Job not found" level={1}>
               <p>
                 Job {id} was deleted or belongs to another server. A deleted job can be restored for
                 24 hours. Others are in the <a href="/jobs">list of jobs</a>.

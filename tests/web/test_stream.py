@@ -83,6 +83,22 @@ def test_failures_without_a_connection_are_retried_and_cleared(
     server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
+def test_code_that_is_missing_after_a_reload_as_well_is_an_error(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB)
+    page = visit(server.url, allowed="ERR_FAILED").go(f"/jobs/{job_id}")
+    expect(page.get_by_role("link", name="Explore")).to_be_visible()
+    page.route("**/assets/panel-*", lambda route: route.abort())
+    loads = []
+    page.on("load", lambda _: loads.append("load"))
+    with page.expect_event("load"):
+        page.get_by_role("link", name="Explore").click()
+    expect(page.get_by_text(re.compile("^Could not load the code"))).to_be_visible()
+    page.wait_for_timeout(3000)
+    assert len(loads) == 1
+
+
 def test_the_page_of_a_missing_job_leads_on(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

@@ -35,18 +35,22 @@ export function lazyPage<P extends object>(
 }
 
 const PROBE_MS = 2000
+const RELOADED = 'gaitswarm-reloaded'
+const RELOAD_INTERVAL_MS = 60_000
 
-/** Reload once a lost server responds; browsers and the bundler remember files that failed. */
+/** Reload once the server responds; browsers and the bundler remember files that failed. */
 function reloadOnceBack(): () => void {
   let lost = false
+  const respond = () => {
+    // A file that is missing after a reload as well stays missing.
+    if (!lost && Date.now() - Number(sessionStorage.getItem(RELOADED)) < RELOAD_INTERVAL_MS) return
+    sessionStorage.setItem(RELOADED, String(Date.now()))
+    location.reload()
+  }
   const probe = () =>
-    fetch(location.href, { method: 'HEAD' }).then(
-      // A server that responds at once lacks the file, and would after a reload.
-      () => lost && location.reload(),
-      () => {
-        lost = true
-      },
-    )
+    fetch(location.href, { method: 'HEAD' }).then(respond, () => {
+      lost = true
+    })
   probe()
   const timer = setInterval(probe, PROBE_MS)
   return () => clearInterval(timer)

@@ -10,7 +10,16 @@ from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    NonNegativeInt,
+    PositiveFloat,
+    ValidationError,
+)
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANTINE_AFTER
@@ -37,6 +46,9 @@ def read_place(text: str, *, field: str) -> tuple[int, int]:
 
 _OF_TESTS: Final = re.compile(r"GAITSWARM_(REQUIRE_|SCREENSHOTS)")
 
+Count = Annotated[int, Field(ge=1)]
+Port = Annotated[int, Field(ge=0, le=65535)]
+Days = Annotated[float, Field(gt=0.0, le=100_000.0)]
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 
 HostName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+(:[0-9]{1,5})?$")]
@@ -69,210 +81,105 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
-    server: str | None = Field(
-        default=None, description="URL of the server that commands about jobs use."
-    )
-    token: str | None = Field(
-        default=None,
-        description="Token sent to the server if it requires one: to that of"
-        " GAITSWARM_SERVER if it is set, and to no other.",
-        repr=False,
-    )
-    token_over_http: bool = Field(
-        default=False,
-        description="Whether a token may leave this machine over plain HTTP, where others on the"
-        " way can read it.",
-    )
-    db: str | None = Field(
-        default=None,
-        repr=False,
-        description="Database of the jobs: a file name, sqlite:///FILE or"
-        " postgresql://USER:PASSWORD@HOST/DATABASE. Default: gaitswarm/gaitswarm.db in the user's"
-        " data directory.",
-    )
-    evaluator: EvaluatorKind = Field(
-        default="auto",
-        description="Where simulations run: on Ray (`ray`), in threads (`in-process`), or `auto`:"
-        " on the cluster at `ray_address`; without one, servers and runners start a local Ray and"
-        " use threads until it is ready, and `optimize` uses threads.",
-    )
-    ray_address: str | None = Field(
-        default=None,
-        description="Ray cluster for all simulations: HOST:PORT of its head, which this machine"
-        " joins, or `auto` on a node.",
-    )
-    cpus: int | None = Field(
-        default=None,
-        ge=1,
-        description="Simulations to run at once on this machine; default all processors.",
-    )
-    cache: bool = Field(
-        default=True,
-        description="Whether to reuse results of designs that a job of the database has simulated"
-        " before.",
-    )
-    kernel_cache_bytes: int = Field(
-        default=DEFAULT_SIZE,
-        ge=0,
-        description="Memory limit of compiled kernels together [B].",
-    )
-    concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs that run at once.")
-    lease_seconds: float = Field(
-        default=30.0,
-        ge=3.0,
-        le=LONGEST_LEASE_SECONDS,
-        description="Time without a heartbeat after which another process takes a job over [s].",
-    )
-    quarantine_after: int = Field(
-        default=QUARANTINE_AFTER,
-        ge=1,
-        le=1000,
-        description="Runner processes in a row that may die with a job before it fails.",
-    )
-    robots: Annotated[tuple[Path, ...], _separated(os.pathsep)] = Field(
-        default=(),
-        description="Folders of robots, or of such folders, separated by `:`, whose meshes a server"
-        " serves to clients that may read its jobs.",
-    )
-    webhook_hosts: Annotated[tuple[HostName, ...], _separated(",")] = Field(
-        default=(),
-        description="Hosts, with or without port and separated by commas, that may be notified of"
-        " ended jobs; none: no notifications.",
-    )
-    webhook_secret: str | None = Field(
-        default=None,
-        description="Secret that signs notifications to GAITSWARM_WEBHOOK_HOSTS; any text, or"
-        " `whsec_` and base64.",
-        repr=False,
-    )
-    drain_seconds: float = Field(
-        default=60.0,
-        ge=0.0,
-        le=86_400.0,
-        description="Time that running iterations have to finish on shutdown [s].",
-    )
-    retention_days: float | None = Field(
-        default=None,
-        gt=0.0,
-        le=100_000.0,
-        description="Age at which `serve` deletes ended jobs [d]; default: never.",
-    )
-    audit_days: float | None = Field(
-        default=None,
-        gt=0.0,
-        le=100_000.0,
-        description="Age at which `serve` removes entries of the audit log [d]; default: never.",
-    )
-    log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
-    log_format: Literal["console", "json"] = Field(
-        default="console",
-        description="`console`: lines for people; `json`: an object for each message.",
-    )
-    metrics_port: int | None = Field(
-        default=None,
-        ge=0,
-        le=65535,
-        description="Port on which `runner` serves metrics and /healthz; 0 chooses a free one, that"
-        " the log names; none: not served.",
-    )
-    metrics_host: str = Field(
-        default="127.0.0.1",
-        description="Address of the metrics port; other than on loopback, metrics need a token.",
-    )
-    api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
-    api_port: int = Field(
-        default=8000, ge=0, le=65535, description="Port to listen on; 0 chooses a free one."
-    )
-    api_access: Literal["auto", "token"] = Field(
-        default="auto",
-        description="`auto`: requests need a token where the server listens beyond its own machine;"
-        " `token`: always.",
-    )
-    api_allowed_hosts: Annotated[tuple[HostName, ...], _separated(",")] = Field(
-        default=(),
-        description="Host names, with or without port and separated by commas, of the server, or"
-        " a runner's metrics port, besides its addresses, `localhost`, its host and"
-        " the machine's name.",
-    )
-    api_max_body_bytes: int = Field(default=1 << 20, ge=1, description="Largest request body [B].")
-    api_max_log_bytes: int = Field(
-        default=1 << 24,
-        ge=1,
-        description="Largest body with a measured log, a second of which takes about a megabyte"
-        " [B].",
-    )
-    api_event_poll_seconds: float = Field(
-        default=0.5,
-        gt=0.0,
-        le=60.0,
-        description="How often jobs that event streams follow are looked at, all at once [s].",
-    )
-    api_compute_workers: int = Field(
-        default=2,
-        ge=1,
-        le=64,
-        description="Requests that simulate, or analyze whole histories, at the same time.",
-    )
-    api_compute_queue: int = Field(
-        default=64,
-        ge=0,
-        description="Further requests that may wait to compute; more get 503.",
-    )
-    api_max_fork_seconds: float = Field(
-        default=20.0,
-        gt=0.0,
-        description="How long bringing a search to where it was may take, for a fork [s]; 409"
-        " beyond it.",
-    )
-    api_max_simulated_seconds: float = Field(
-        default=300.0,
-        gt=0.0,
-        description="Longest simulated time of one request, all scenarios added [s].",
-    )
-    api_max_logged_seconds: float = Field(
-        default=40.0, gt=0.0, description="Longest simulated time of a request with logs [s]."
-    )
-    api_max_sampled_seconds: float = Field(
-        default=10_000.0,
-        gt=0.0,
-        description="Longest simulated time of a request for a sample of designs, all designs added"
-        " [s].",
-    )
-    api_max_job_seconds: float = Field(
-        default=1e10,
-        gt=0.0,
-        description="Longest job that is accepted, in simulated time of all designs [s]: by default"
-        " three months of one core at 1200 x real time.",
-    )
-    api_max_unfinished_jobs: int = Field(
-        default=10_000,
-        ge=1,
-        description="Jobs of one owner that may be queued, running or paused; `admin` may submit"
-        " more.",
-    )
-    api_max_unfinished_seconds: float = Field(
-        default=1e11,
-        gt=0.0,
-        description="Simulated time of the unfinished jobs of one owner, over all"
-        " designs added [s].",
-    )
-    api_max_connections: int = Field(
-        default=1000, ge=1, description="Connections and requests in progress; more get 503."
-    )
-    api_idle_seconds: int = Field(
-        default=15, ge=1, description="Idle time after which a connection is closed [s]."
-    )
-    api_trusted_proxies: Annotated[tuple[Network, ...], _separated(",")] = Field(
-        default=("127.0.0.1", "::1"),
-        description="Addresses or networks, separated by commas, of proxies trusted to state"
-        " the client's address and scheme.",
-    )
-    api_shutdown_seconds: int = Field(
-        default=5,
-        ge=1,
-        le=600,
-        description="Time that open requests have to finish on shutdown [s].",
-    )
+    server: str | None = None
+    """URL of the server that commands about jobs use."""
+    token: str | None = Field(default=None, repr=False)
+    """Token sent to the server if it requires one: to that of GAITSWARM_SERVER if it is set, and to
+    no other."""
+    token_over_http: bool = False
+    """Whether a token may leave this machine over plain HTTP, where others on the way can read
+    it."""
+    db: str | None = Field(default=None, repr=False)
+    """Database of the jobs: a file name, sqlite:///FILE or
+    postgresql://USER:PASSWORD@HOST/DATABASE. Default: gaitswarm/gaitswarm.db in the user's data
+    directory."""
+    evaluator: EvaluatorKind = "auto"
+    """Where simulations run: on Ray (`ray`), in threads (`in-process`), or `auto`: on the cluster
+    at `ray_address`; without one, servers and runners start a local Ray and use threads until it is
+    ready, and `optimize` uses threads."""
+    ray_address: str | None = None
+    """Ray cluster for all simulations: HOST:PORT of its head, which this machine joins, or `auto`
+    on a node."""
+    cpus: Count | None = None
+    """Simulations to run at once on this machine; default all processors."""
+    cache: bool = True
+    """Whether to reuse results of designs that a job of the database has simulated before."""
+    kernel_cache_bytes: NonNegativeInt = DEFAULT_SIZE
+    """Memory limit of compiled kernels together [B]."""
+    concurrent_jobs: Annotated[int, Field(ge=1, le=256)] = 2
+    """Jobs that run at once."""
+    lease_seconds: Annotated[float, Field(ge=3.0, le=LONGEST_LEASE_SECONDS)] = 30.0
+    """Time without a heartbeat after which another process takes a job over [s]."""
+    quarantine_after: Annotated[int, Field(ge=1, le=1000)] = QUARANTINE_AFTER
+    """Runner processes in a row that may die with a job before it fails."""
+    robots: Annotated[tuple[Path, ...], _separated(os.pathsep)] = ()
+    """Folders of robots, or of such folders, separated by `:`, whose meshes a server serves to
+    clients that may read its jobs."""
+    webhook_hosts: Annotated[tuple[HostName, ...], _separated(",")] = ()
+    """Hosts, with or without port and separated by commas, that may be notified of ended jobs;
+    none: no notifications."""
+    webhook_secret: str | None = Field(default=None, repr=False)
+    """Secret that signs notifications to GAITSWARM_WEBHOOK_HOSTS; any text, or `whsec_` and
+    base64."""
+    drain_seconds: Annotated[float, Field(ge=0.0, le=86_400.0)] = 60.0
+    """Time that running iterations have to finish on shutdown [s]."""
+    retention_days: Days | None = None
+    """Age at which `serve` deletes ended jobs [d]; default: never."""
+    audit_days: Days | None = None
+    """Age at which `serve` removes entries of the audit log [d]; default: never."""
+    log_level: LogLevel = "INFO"
+    """Least severe message that is logged."""
+    log_format: Literal["console", "json"] = "console"
+    """`console`: lines for people; `json`: an object for each message."""
+    metrics_port: Port | None = None
+    """Port on which `runner` serves metrics and /healthz; 0 chooses a free one, that the log names;
+    none: not served."""
+    metrics_host: str = "127.0.0.1"
+    """Address of the metrics port; other than on loopback, metrics need a token."""
+    api_host: str = "127.0.0.1"
+    """Address to listen on."""
+    api_port: Port = 8000
+    """Port to listen on; 0 chooses a free one."""
+    api_access: Literal["auto", "token"] = "auto"
+    """`auto`: requests need a token where the server listens beyond its own machine; `token`:
+    always."""
+    api_allowed_hosts: Annotated[tuple[HostName, ...], _separated(",")] = ()
+    """Host names, with or without port and separated by commas, of the server, or a runner's
+    metrics port, besides its addresses, `localhost`, its host and the machine's name."""
+    api_max_body_bytes: Count = 1 << 20
+    """Largest request body [B]."""
+    api_max_log_bytes: Count = 1 << 24
+    """Largest body with a measured log, a second of which takes about a megabyte [B]."""
+    api_event_poll_seconds: Annotated[float, Field(gt=0.0, le=60.0)] = 0.5
+    """How often jobs that event streams follow are looked at, all at once [s]."""
+    api_compute_workers: Annotated[int, Field(ge=1, le=64)] = 2
+    """Requests that simulate, or analyze whole histories, at the same time."""
+    api_compute_queue: NonNegativeInt = 64
+    """Further requests that may wait to compute; more get 503."""
+    api_max_fork_seconds: PositiveFloat = 20.0
+    """How long bringing a search to where it was may take, for a fork [s]; 409 beyond it."""
+    api_max_simulated_seconds: PositiveFloat = 300.0
+    """Longest simulated time of one request, all scenarios added [s]."""
+    api_max_logged_seconds: PositiveFloat = 40.0
+    """Longest simulated time of a request with logs [s]."""
+    api_max_sampled_seconds: PositiveFloat = 10_000.0
+    """Longest simulated time of a request for a sample of designs, all designs added [s]."""
+    api_max_job_seconds: PositiveFloat = 1e10
+    """Longest job that is accepted, in simulated time of all designs [s]: by default three months
+    of one core at 1200 x real time."""
+    api_max_unfinished_jobs: Count = 10_000
+    """Jobs of one owner that may be queued, running or paused; `admin` may submit more."""
+    api_max_unfinished_seconds: PositiveFloat = 1e11
+    """Simulated time of the unfinished jobs of one owner, over all designs added [s]."""
+    api_max_connections: Count = 1000
+    """Connections and requests in progress; more get 503."""
+    api_idle_seconds: Count = 15
+    """Idle time after which a connection is closed [s]."""
+    api_trusted_proxies: Annotated[tuple[Network, ...], _separated(",")] = ("127.0.0.1", "::1")
+    """Addresses or networks, separated by commas, of proxies trusted to state the client's address
+    and scheme."""
+    api_shutdown_seconds: Annotated[int, Field(ge=1, le=600)] = 5
+    """Time that open requests have to finish on shutdown [s]."""
 
     @property
     def tokens_required(self) -> bool:

@@ -52,7 +52,7 @@ _GROUPS: Final = {
 """Help texts and commands of groups."""
 
 _PANELS: Final = {
-    "Start here": "optimize.optimize serve.serve jobs.submit jobs.list_jobs jobs.status jobs.best"
+    "Start here": "jobs.optimize serve.serve jobs.submit jobs.list_jobs jobs.status jobs.best"
     " designs.simulate robot",
     "Jobs": "jobs.watch jobs.history jobs.pause jobs.resume jobs.extend jobs.prioritize jobs.cancel"
     " jobs.fork jobs.label jobs.keep jobs.delete jobs.diff serve.runner",

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from gaitswarm.cli.files import replacing
-from gaitswarm.cli.output import note
+from gaitswarm.cli.output import note, replacing
 from gaitswarm.cli.tables import SHORT
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD

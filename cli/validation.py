@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from gaitswarm.cli.files import replacing
+from gaitswarm.cli.output import replacing
 from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.measurement.measured_log import Quantity

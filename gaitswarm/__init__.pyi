@@ -1,12 +1,11 @@
-from gaitswarm.errors import Interrupted, JobEnded
 from gaitswarm.evidence.verify import verify
-from gaitswarm.firmware import FirmwareView, write_firmware
+from gaitswarm.firmware import FirmwareView, TrajectoriesView, write_firmware, write_trajectories
 from gaitswarm.jobs.asynchronous import AsyncJobs
 from gaitswarm.jobs.base import JobEvent, Jobs
-from gaitswarm.jobs.database import DatabaseJobs
+from gaitswarm.jobs.database import DatabaseJobs, Interrupted
 from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
-from gaitswarm.optimization import OptimizationResult, optimize
+from gaitswarm.optimization import JobEnded, OptimizationResult, optimize
 from gaitswarm.services.optimizer.analysis.candidate_preferences import CandidatePreferencesView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
@@ -62,7 +61,6 @@ from gaitswarm.sim.variables import Variable
 from gaitswarm.simulation import ScenarioResult, SimulationResult, robustness, simulate
 from gaitswarm.specs import SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
-from gaitswarm.trajectories import TrajectoriesView, write_trajectories
 from gaitswarm.views.catalogue import optimizers
 from gaitswarm.views.job import (
     BestView,

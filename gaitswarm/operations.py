@@ -8,9 +8,17 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
+from gaitswarm.evidence.archive import zipped
+from gaitswarm.firmware import (
+    FirmwareRequest,
+    FirmwareView,
+    TrajectoriesRequest,
+    firmware_view,
+    run_firmware,
+)
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.operation import (
+    ZIP,
     After,
     AfterIteration,
     Context,
@@ -20,7 +28,6 @@ from gaitswarm.jobs.operation import (
     operations,
     robots,
 )
-from gaitswarm.meshes import MeshFileView, mesh_content, mesh_views
 from gaitswarm.recordings import (
     MeasuredWalkRequest,
     MeasuredWalkView,
@@ -28,7 +35,15 @@ from gaitswarm.recordings import (
     read_measured_walk,
 )
 from gaitswarm.replay import ReplayRequest, run_replay
-from gaitswarm.robots import RobotCheckView, RobotDraftRequest, RobotDraftView, run_robot_draft
+from gaitswarm.robots import (
+    MeshFileView,
+    RobotCheckView,
+    RobotDraftRequest,
+    RobotDraftView,
+    mesh_content,
+    mesh_views,
+    run_robot_draft,
+)
 from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.services.optimizer.analysis.comparison import ConvergencesView, convergence
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView, encoded_particles
@@ -48,7 +63,6 @@ from gaitswarm.sim.gait.setpoints import trajectory_files
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.simulation import SimulationView, run_robustness, run_simulation
-from gaitswarm.trajectories import TrajectoriesRequest
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,
@@ -66,8 +80,6 @@ from gaitswarm.views.catalogue import (
 )
 from gaitswarm.views.job import JobFacetsView
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
-from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
-from gaitswarm.zip_archive import zipped
 
 TableBits = Annotated[str | None, Field(pattern=r"^[0-9]{1,2}x[0-9]{1,2}$", examples=["8x6"])]
 

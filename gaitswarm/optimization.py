@@ -9,11 +9,10 @@ from typing import Unpack
 
 import numpy as np
 
-from gaitswarm.errors import JobEnded
 from gaitswarm.jobs.database import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.services.optimizer.analysis.verdict import VerdictView
-from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.errors import GaitswarmError, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.iteration import SUMMARY
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -22,6 +21,18 @@ from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.specs import SpecInput, SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views.job import BestView, IterationView, JobView
+
+
+class JobEnded(GaitswarmError):
+    """The awaited job did not succeed.
+
+    Attributes:
+        job: The job: paused, cancelled or failed.
+    """
+
+    def __init__(self, job: JobView) -> None:
+        self.job = job
+        super().__init__(f"job {job.id} is {job.state}" + (f": {job.error}" if job.error else ""))
 
 
 @dataclass(frozen=True, slots=True)

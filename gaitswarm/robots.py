@@ -1,4 +1,4 @@
-"""Robots of one's own, made from a URDF, xacro or MJCF."""
+"""Robots of one's own, made from a URDF, xacro or MJCF, and their meshes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
 from gaitswarm.sim.controllers.joint_pd import LARGEST_GAIN
@@ -43,11 +43,14 @@ from gaitswarm.sim.robot.bounds import (
 from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.meshes import (
+    FORMS,
+    MeshFormat,
     Packages,
     copy_meshes,
     found_mesh,
     mesh_places,
     package_places,
+    served_meshes,
 )
 from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, leg_points
 from gaitswarm.sim.robot.robot import Robot
@@ -56,6 +59,7 @@ from gaitswarm.sim.robot.urdf import unphysical
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import Simulation, simulate
 from gaitswarm.sim.variables import Variable
+from gaitswarm.views.base import PREFIX
 
 JOB_FILE: Final = "job.json"
 """In a robot's folder: what a job of this robot has unless it says otherwise."""
@@ -536,3 +540,45 @@ def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
     return RobotDraftView(
         name=name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.notes)
     )
+
+
+class MeshFileView(View):
+    """A mesh that a robot's URDF names, and whether this server has its file."""
+
+    name: str = Field(description="As the URDF has it.", examples=["meshes/hip.stl"])
+    format: MeshFormat | None = Field(
+        description="Media type by file extension; null if the file is not served.",
+        examples=["stl"],
+    )
+    url: str | None = Field(
+        description="Path of the file; null if it is not served.",
+        examples=["/v1/robots/" + 64 * "0" + "/meshes/0"],
+    )
+    problem: str | None = Field(description="Why it is not served; null if it is.", examples=[None])
+
+
+def mesh_views(folders: Sequence[Path], digest: str) -> list[MeshFileView]:
+    """Describe the meshes of a robot."""
+    return [
+        MeshFileView(
+            name=name,
+            format=FORMS.get(Path(name).suffix.lower()),
+            url=None if isinstance(found, str) else f"{PREFIX}/robots/{digest}/meshes/{number}",
+            problem=found if isinstance(found, str) else None,
+        )
+        for number, (name, found) in enumerate(served_meshes(folders, digest).items())
+    ]
+
+
+def mesh_content(folders: Sequence[Path], digest: str, number: int) -> bytes:
+    """A mesh of a robot, by its number in the list."""
+    meshes = list(served_meshes(folders, digest).items())
+    if number >= len(meshes):
+        raise NotFound(f"the robot has no mesh {number}, but {len(meshes)} in all")
+    name, found = meshes[number]
+    if isinstance(found, str):
+        raise NotFound(f"mesh {name[:200]}: {found}")
+    try:
+        return found.read_bytes()
+    except OSError as error:
+        raise NotFound(f"mesh {name[:200]}: {error.strerror}") from error

@@ -11,7 +11,6 @@ from typing import Any, Final, Literal, TypeAlias, TypedDict, TypeVar, Unpack, c
 
 from pydantic import BaseModel, ValidationError
 
-from gaitswarm.errors import invalid_request
 from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
@@ -23,12 +22,13 @@ from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
 from gaitswarm.services.optimizer.search.registry import OptimizerName, OptimizerSettings
 from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName
-from gaitswarm.sim.input import numbers_from_booleans
+from gaitswarm.sim.input import numbers_from_booleans, with_known_keys
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.robot import RobotFiles, RobotVariant
 from gaitswarm.sim.robot.variant import SHIPPED
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable
+from gaitswarm.views.base import field_errors
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -110,6 +110,14 @@ def laid_options(options: Mapping[str, Any]) -> dict[str, Any]:
     if "scenarios" in given:
         given["scenarios"] = scenario_entries(given["scenarios"])
     return given
+
+
+def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest:
+    """Convert pydantic's errors to one InvalidRequest."""
+    found = with_known_keys(error.errors(include_url=False), model)
+    first, *others = field_errors(found)
+    more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
+    return InvalidRequest(first.message + more, field=first.field)
 
 
 def checked(kind: type[M], arguments: Mapping[str, Any]) -> M:

@@ -21,9 +21,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from gaitswarm.cli.commands.measurements import WalkOptions, read_truth
 from gaitswarm.cli.exit_codes import exit_code, explanation
-from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import Place, expanded
-from gaitswarm.cli.output import note
+from gaitswarm.cli.output import note, replacing
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import (
     ConstraintOption,
     JobId,
@@ -21,7 +20,7 @@ from gaitswarm.cli.options import (
     ScenarioWeight,
     completed_reference,
 )
-from gaitswarm.cli.output import Parts, Printed, note
+from gaitswarm.cli.output import Parts, Printed, note, replacing
 from gaitswarm.cli.tables import MISSING, SHORT, Bold, number, percent, place, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 

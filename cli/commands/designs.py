@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import (
     ControllerOption,
     Place,
@@ -21,7 +20,7 @@ from gaitswarm.cli.options import (
     TerrainOption,
     TrajectoryOption,
 )
-from gaitswarm.cli.output import Parts, Printed, note
+from gaitswarm.cli.output import Parts, Printed, note, replacing
 from gaitswarm.cli.tables import (
     SHORT,
     Bold,
@@ -36,11 +35,10 @@ from gaitswarm.cli.tables import (
 
 if TYPE_CHECKING:
     from gaitswarm.cli.inputs import GivenDesign
-    from gaitswarm.firmware import FirmwareView
+    from gaitswarm.firmware import FirmwareView, TrajectoriesView
     from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
     from gaitswarm.sim.scenario import Scenario
     from gaitswarm.simulation import Progress, SimulationView
-    from gaitswarm.trajectories import TrajectoriesView
 
 
 def simulate(
@@ -396,7 +394,7 @@ def trajectories(
 ) -> Printed:
     """Write a design's joint angles for position-controlled servos, as CSV and for ROS 2."""
     from gaitswarm.cli.inputs import given_design
-    from gaitswarm.trajectories import write_trajectories
+    from gaitswarm.firmware import write_trajectories
 
     given = given_design(design, controller, robot=robot, place=place)
     view = write_trajectories(

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from gaitswarm.cli.exit_codes import CheckFailed
-from gaitswarm.cli.files import replacing
 from gaitswarm.cli.options import JobId, Json, Place, full_id
-from gaitswarm.cli.output import Parts, note, show
+from gaitswarm.cli.output import Parts, note, replacing, show
 from gaitswarm.cli.tables import number, table
 from gaitswarm.cli.tables import place as place_of
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest

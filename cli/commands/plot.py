@@ -20,7 +20,7 @@ Output = Annotated[
 def convergence(job_id: JobId, output: Output, *, jobs: Jobs) -> None:
     """Draw a job's fitness over its iterations."""
     from gaitswarm.cli.pictures import save
-    from gaitswarm.evidence.page import draw_convergence
+    from gaitswarm.evidence.archive import draw_convergence
 
     job, iterations = jobs.job(job_id), list(jobs.iterations(job_id))
     save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)

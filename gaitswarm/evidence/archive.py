@@ -1,12 +1,20 @@
-"""The evidence file: its members, how they are written, and checks of each before use."""
+"""The evidence file: its members and its page, how they are written, and checks before use.
+
+Members are not compressed. Equal members then make equal bytes whatever the zip library, and an
+archive that claims to hold more than it is long is recognized before anything of it is read.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import re
+import stat
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
@@ -14,10 +22,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json, to_json
 
-from gaitswarm.evidence.page import MANIFEST, CertificateOnPage, page
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
-from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import Link
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
@@ -35,6 +42,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.settings import place_of
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification import RecordedWalk, Recordings
@@ -43,10 +51,91 @@ from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 from gaitswarm.tables import decoded_table, encoded_table
 from gaitswarm.views.job import BestView, IterationView
-from gaitswarm.zip_archive import BadArchive, zipped
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    from matplotlib.figure import Figure
+
+
+LARGEST_ARCHIVE: Final = 1 << 30
+"""Largest archive that is read [B]."""
+
+MOST_MEMBERS: Final = 10_000
+
+_UNIX: Final = 3
+
+_NEW: Final = stat.S_IFREG | 0o644
+
+
+class BadArchive(ValueError):
+    """A file is not such an archive, or is damaged."""
+
+
+def zipped(members: Mapping[str, bytes]) -> bytes:
+    """Write an archive."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in sorted(members.items()):
+            entry = zipfile.ZipInfo(name)
+            entry.create_system = _UNIX
+            entry.external_attr = _NEW << 16
+            archive.writestr(entry, content)
+    return file.getvalue()
+
+
+def unzipped(content: bytes) -> dict[str, bytes]:
+    """Read all members of an archive after checking that this is safe."""
+    if len(content) > LARGEST_ARCHIVE:
+        raise BadArchive(f"it is larger than {LARGEST_ARCHIVE >> 30} GiB")
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            entries = archive.infolist()
+            _check_entries(entries, len(content))
+            return {entry.filename: archive.read(entry) for entry in entries}
+    except BadArchive:
+        raise
+    except (
+        zipfile.BadZipFile,
+        EOFError,
+        LookupError,
+        OSError,
+        OverflowError,
+        RuntimeError,
+        ValueError,
+    ) as error:
+        raise BadArchive(f"it is not a complete zip archive: {error}") from error
+
+
+def _check_entries(entries: list[zipfile.ZipInfo], length: int) -> None:
+    if len(entries) > MOST_MEMBERS:
+        raise BadArchive(f"it has more than {MOST_MEMBERS} members")
+    names = [entry.filename for entry in entries]
+    if len(set(names)) < len(names):
+        raise BadArchive("a name occurs twice in it")
+    for entry in entries:
+        name = entry.filename
+        if not _is_safe(name):
+            raise BadArchive(f"the name of a member leads out of it: {name[:80]!r}")
+        if entry.compress_type != zipfile.ZIP_STORED or entry.file_size != entry.compress_size:
+            raise BadArchive(f"{name[:80]!r} is compressed, which no evidence is")
+        if entry.flag_bits & 0x1:
+            raise BadArchive(f"{name[:80]!r} is encrypted")
+    # Overlapping members would be read several times.
+    if sum(entry.file_size for entry in entries) > length:
+        raise BadArchive("its members claim to be longer than it is")
+
+
+def _is_safe(name: str) -> bool:
+    path = PurePosixPath(name)
+    return (
+        name.isprintable()
+        and "\\" not in name
+        and ":" not in name
+        and not path.is_absolute()
+        and ".." not in path.parts
+        and str(path) == name
+    )
+
 
 JOB: Final = "job.json"
 SPEC: Final = "spec.json"
@@ -474,3 +563,109 @@ def robot_members(sources: Sequence[RobotSource]) -> dict[str, bytes]:
         files[f"robots/{number}/description.json"] = description.encode()
         files[f"robots/{number}/robot.urdf"] = robot.urdf.text.encode()
     return files
+
+
+MANIFEST: Final = "manifest.json"
+
+_INK: Final = "#1f3a5f"
+_ACCENT: Final = "#d1495b"
+
+_WORST: Final = 10
+"""Worst worlds of a certificate that the page lists."""
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateOnPage:
+    """A certificate as the page shows it."""
+
+    view: CertificateView
+    place: tuple[int, int] | None = None  # of the design in the job; None on the job's own page
+    is_best: bool = False
+
+    @property
+    def robot(self) -> str:
+        return load_robot(self.view.robot).description.name
+
+
+def page(
+    job: Job,
+    best: BestView | None,
+    iterations: Sequence[IterationView],
+    certificates: Sequence[CertificateOnPage],
+    files: Sequence[str],
+) -> str:
+    """Write the page."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("gaitswarm.evidence", ""),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"number": _number, "place": lambda place: place_of(*place)}
+    return environment.get_template("page.html").render(
+        job=job,
+        spec=job.spec,
+        best=best,
+        tunes_a_drive=isinstance(job.spec, JobSpec),
+        units={variable.name: variable.unit for variable in job.spec.design_space().variables},
+        figure=_svg(draw_convergence(iterations, title="Fitness over iterations")),
+        certificates=certificates,
+        worst=_WORST,
+        files=sorted(files),
+        manifest=MANIFEST,
+    )
+
+
+def _number(value: float | str | None) -> str:
+    if value is None:
+        return "–"
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figure:
+    """Draw fitness (minimized) over iterations: best so far, median, and the best-worst band."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+
+    if not iterations:
+        raise InvalidRequest("the job has no committed iteration to draw yet")
+    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_title(title, loc="left", weight="bold")
+    axes.spines[["top", "right"]].set_visible(False)
+    index = [i.index for i in iterations]
+    best, median, worst, so_far = (
+        # None becomes NaN.
+        np.array([getattr(i, name) for i in iterations], dtype=np.float64)
+        for name in ("best", "median", "worst", "best_so_far")
+    )
+    axes.fill_between(index, best, worst, color=_INK, alpha=0.12, lw=0, label="designs")
+    axes.plot(index, median, color=_INK, alpha=0.6, lw=1.2, label="median of the iteration")
+    label = f"best so far, finally {so_far[-1]:.4g}"
+    axes.step(index, so_far, where="post", color=_ACCENT, lw=2.2, label=label)
+    axes.set_yscale("log")
+    # 25 instead of 2.5 x 10^1: a fitness varies by less than a decade.
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(index[0], max(index[-1], index[0] + 1))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("iteration")
+    axes.set_ylabel("fitness, minimized  [1]")
+    axes.grid(visible=True, which="both", color="0.9", lw=0.6)
+    axes.legend(frameon=False, loc="upper right")
+    return figure
+
+
+def _svg(figure: Figure) -> str:
+    """An SVG element; equal figures are equal texts."""
+    import matplotlib as mpl
+
+    sink = io.StringIO()
+    metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with mpl.rc_context({"svg.hashsalt": "gaitswarm", "svg.fonttype": "none"}):
+        figure.savefig(sink, format="svg", metadata=metadata)
+    return re.sub(r"^.*?(?=<svg )", "", sink.getvalue(), flags=re.DOTALL)

@@ -21,9 +21,11 @@ from gaitswarm.evidence.archive import (
     CERTIFICATES,
     CHAIN,
     JOB,
+    LARGEST_ARCHIVE,
     SPEC,
     SUMMARY,
     WORST,
+    BadArchive,
     Evidence,
     Place,
     best_of,
@@ -34,6 +36,7 @@ from gaitswarm.evidence.archive import (
     parsed_json,
     read_evidence,
     robot_members,
+    unzipped,
 )
 from gaitswarm.services.optimizer.analysis.certificate import certificate as certificate_view
 from gaitswarm.services.optimizer.analysis.fork import retraced
@@ -70,7 +73,6 @@ from gaitswarm.views.verification import (
     HistoryVerificationView,
     VerificationView,
 )
-from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
 
 _DIGITS: Final = 32
 

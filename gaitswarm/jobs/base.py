@@ -28,6 +28,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from gaitswarm.jobs.operation import (
+    ZIP,
     After,
     AfterIteration,
     Context,
@@ -77,7 +78,6 @@ from gaitswarm.views.job import (
     JobView,
     StateView,
 )
-from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 
 if TYPE_CHECKING:
     from gaitswarm.jobs import types

@@ -12,7 +12,6 @@ from itertools import groupby
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from gaitswarm.errors import Interrupted
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
 from gaitswarm.services.optimizer.errors import (
@@ -41,6 +40,24 @@ _RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 
 POLL_SECONDS: Final = 0.5
 """Time between two readings of a followed job [s]."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C while running a job. Committed iterations are stored, and the job is queued again.
+
+    A job that was only followed continues in the process that runs it.
+
+    Attributes:
+        job: The job as it was then.
+    """
+
+    def __init__(self, job: JobView, db: str) -> None:
+        self.job = job
+        left = "continues in another process" if job.state == "running" else "was queued again"
+        super().__init__(
+            f"job {job.id} {left} after {job.spent};"
+            f" resume it with gaitswarm.optimize(resume={job.id!r}, db={masked_url(db)!r})"
+        )
 
 
 class DatabaseJobs(Jobs):

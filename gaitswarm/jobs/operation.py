@@ -252,6 +252,8 @@ class Operation:
         return given
 
 
+ZIP: Final = "application/zip"
+
 OPERATIONS: Final[list[Operation]] = []
 """All operations that have been imported."""
 

@@ -10,10 +10,9 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from gaitswarm.firmware import write_firmware
+from gaitswarm.firmware import write_firmware, write_trajectories
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.trajectories import write_trajectories
 from tests.api.conftest import Commit, Serve
 
 pytestmark = pytest.mark.slow

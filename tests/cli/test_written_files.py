@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.cli.files import replacing
+from gaitswarm.cli.output import replacing
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 

@@ -16,9 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import archived
-from gaitswarm.evidence.page import MANIFEST
-from gaitswarm.zip_archive import unzipped
+from gaitswarm.evidence.archive import MANIFEST, archived, unzipped
 from tests.examples.walks import SHORT_WALK
 
 JOB: dict[str, Any] = {

@@ -13,7 +13,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm import VerificationView
-from gaitswarm.zip_archive import unzipped
+from gaitswarm.evidence.archive import unzipped
 from tests.evidence.conftest import (
     EVALUATIONS,
     Certified,

@@ -17,12 +17,11 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import evidence
+from gaitswarm.evidence.archive import evidence, unzipped
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.sim.kernel import Precision
-from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import JOB, Proved
 from tests.examples.servers import Server
 

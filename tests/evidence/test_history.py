@@ -13,11 +13,9 @@ import pytest
 
 import gaitswarm
 from gaitswarm.cli.exit_codes import ExitCode
-from gaitswarm.evidence.archive import archived
-from gaitswarm.evidence.page import MANIFEST
+from gaitswarm.evidence.archive import MANIFEST, archived, unzipped
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
-from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, JOB, Proved, tampered, with_cells
 from tests.examples.commands import run_command
 

@@ -16,11 +16,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import archived, parsed_json
-from gaitswarm.evidence.page import MANIFEST
+from gaitswarm.evidence.archive import MANIFEST, archived, parsed_json, unzipped
 from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.robot import check
-from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, Change, Proved, tampered, with_manifest
 from tests.examples.hostile import TOML, URDF, chain
 

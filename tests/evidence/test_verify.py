@@ -12,11 +12,10 @@ import pytest
 
 import gaitswarm
 from gaitswarm import VerificationView
-from gaitswarm.evidence.page import MANIFEST
+from gaitswarm.evidence.archive import MANIFEST, unzipped
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import (
     ASKS,
     EVALUATIONS,

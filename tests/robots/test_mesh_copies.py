@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.cli.main import run
-from gaitswarm.meshes import mesh_content
+from gaitswarm.robots import mesh_content
 from gaitswarm.sim.robot import meshes
 from gaitswarm.sim.robot.meshes import copy_meshes, own_place, served_meshes, urdf_digest
 from tests.robots.test_proposal import dog

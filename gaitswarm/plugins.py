@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
+from gaitswarm.services.optimizer.search.optimizer import (
+    Optimizer,
+    Proposals,
+    SearchSettings,
+    Start,
+)
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, SwarmSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import Method, create_search, from_generator
-from gaitswarm.services.optimizer.search.replayed import Proposals, Start
 from gaitswarm.services.optimizer.search.space import Axis, Space
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.case_registry import CaseFamily, CaseSettings

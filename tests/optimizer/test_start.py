@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.search.hype import Hype
-from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, Proposals, Replayed, Start
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import (
@@ -18,7 +18,6 @@ from gaitswarm.services.optimizer.search.registry import (
     RandomSearchSettings,
     create_search,
 )
-from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed, Start
 from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]

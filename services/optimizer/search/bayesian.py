@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import Field
 
 from gaitswarm.services.optimizer.search.cma_es import CmaEs, CmaEsSettings
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.differential_evolution import latin_hypercube
+from gaitswarm.services.optimizer.search.optimizer import Proposals, SearchSettings, Start
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, normal_quantiles
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
@@ -72,7 +72,7 @@ def bayesian(
     become too small. A design of a batch is chosen as if the fitness of the previous ones were as
     expected (Kriging believer, Ginsbourger et al. 2010). CMA-ES continues with small steps.
     """
-    designs = space.designs(_latin_hypercube(space, settings.sample, random))
+    designs = space.designs(latin_hypercube(space, settings.sample, random))
     fitness = yield space.positions(designs)
     if start is not None:
         designs = np.vstack([space.designs(start.positions), designs])
@@ -115,7 +115,7 @@ def _most_promising(
     least = float(model.values.min())
     best = model.designs[[np.argmin(model.values)]]
     region = _region(space, best[0], sides)
-    points = region.designs(_latin_hypercube(region, _CANDIDATES, random))
+    points = region.designs(latin_hypercube(region, _CANDIDATES, random))
     merit = log_improvement(*model.predict(points), least)
     for width in _WIDTHS:
         top = points[np.argsort(-merit, kind="stable")[:_PARENTS]]
@@ -154,18 +154,9 @@ def _steps(space: Space, parents: Floats, width: float, random: RandomNumbers) -
 
 def normal_scores(fitness: Floats) -> Floats:
     """Return the quantiles of a normal distribution at the ranks: the model sees no magnitudes."""
-    require_room_for_scipy()
-    from scipy.special import ndtri  # noqa: PLC0415 - slow to import
-
     _, value, counts = np.unique(fitness, return_inverse=True, return_counts=True)
-    scores: Floats = ndtri((np.cumsum(counts) - 0.5 * counts) / len(fitness))[value]
+    scores: Floats = normal_quantiles((np.cumsum(counts) - 0.5 * counts) / len(fitness))[value]
     return scores
-
-
-def _latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:
-    """Draw positions with one in each of equal slices of every variable."""
-    slices = np.array([random.permutation(count) for _ in range(space.dimension)]).T
-    return space.evenly((slices + random.uniform(count, space.dimension)) / count)
 
 
 _SQRT_5: Final = math.sqrt(5.0)

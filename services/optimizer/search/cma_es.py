@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, PositiveFloat
 
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.space import Space
-from gaitswarm.services.optimizer.search.stateful import (
+from gaitswarm.services.optimizer.search.optimizer import (
     Fitness,
     Generational,
     GenerationState,
     Numbers,
+    SearchSettings,
 )
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, normal_quantiles
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.memory import require_room_for_scipy
 
 _SAMPLE: Final = 5
 _RESTART: Final = 6
@@ -373,9 +372,9 @@ class NormalDistribution:
         d, mu_eff = int(np.count_nonzero(is_free)), self._mu_eff
         rate = (mu_eff + 2.0) / (d + mu_eff + 5.0)
         damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (d + 1.0)) - 1.0)
-        self.state.sigma_path = (1.0 - rate) * self.state.sigma_path + math.sqrt(
-            rate * (2.0 - rate) * mu_eff
-        ) * np.where(is_free, step, 0.0)
+        gain = math.sqrt(rate * (2.0 - rate) * mu_eff)
+        free_step = np.where(is_free, step, 0.0)
+        self.state.sigma_path = (1.0 - rate) * self.state.sigma_path + gain * free_step
         self.state.weights[0] = (1.0 - rate) ** 2 * self.state.weights[0] + rate * (2.0 - rate)
         length = math.fsum(self.state.sigma_path**2)
         expected = math.sqrt(d) * (1.0 - 1.0 / (4.0 * d) + 1.0 / (21.0 * d * d))
@@ -385,32 +384,29 @@ class NormalDistribution:
 
     def _learned_correlation(self, path_step: Floats, y: Floats, weight_factor: Floats) -> Floats:
         """Return the updated covariance of y, whose diagonal is no longer 1."""
-        rates = self._correlation_rates
-        self.state.correlation_path, self.state.weights[1] = self._path(
-            rates, self.state.correlation_path, path_step, self.state.weights[1]
+        rates, state = self._correlation_rates, self.state
+        state.correlation_path, state.weights[1] = self._path(
+            rates, state.correlation_path, path_step, state.weights[1]
         )
-        path = self.state.correlation_path / self.state.scale
+        path = state.correlation_path / state.scale
         weights = np.where(rates.weights < 0.0, rates.weights * weight_factor, rates.weights)
-        rank_one = path[:, np.newaxis] * path - self.state.weights[1] * self.state.correlation
+        rank_one = path[:, np.newaxis] * path - state.weights[1] * state.correlation
         rank_mu = (
-            product((y * weights[:, np.newaxis]).T, y) - math.fsum(weights) * self.state.correlation
+            product((y * weights[:, np.newaxis]).T, y) - math.fsum(weights) * state.correlation
         )
-        return self.state.correlation + rates.rank_one * rank_one + rates.rank_mu * rank_mu
+        return state.correlation + rates.rank_one * rank_one + rates.rank_mu * rank_mu
 
     def _learned_scale(self, path_step: Floats, z: Floats, weight_factor: Floats) -> Floats:
         """Return (d,) changes of the logarithms of the variances."""
-        rates = self._scale_rates
-        self.state.scale_path, self.state.weights[2] = self._path(
-            rates, self.state.scale_path, path_step, self.state.weights[2]
+        rates, state = self._scale_rates, self.state
+        state.scale_path, state.weights[2] = self._path(
+            rates, state.scale_path, path_step, state.weights[2]
         )
-        path = product(
-            (self.state.scale_path / self.state.scale)[np.newaxis], self._root().inverse
-        )[0]
+        path = product((state.scale_path / state.scale)[np.newaxis], self._root().inverse)[0]
         weights = np.where(rates.weights < 0.0, rates.weights * weight_factor, rates.weights)
         rank_mu = product(weights[np.newaxis], np.square(z))[0] - math.fsum(weights)
-        change: Floats = (
-            rates.rank_one * (np.square(path) - self.state.weights[2]) + rates.rank_mu * rank_mu
-        )
+        rank_one = rates.rank_one * (np.square(path) - state.weights[2])
+        change: Floats = rank_one + rates.rank_mu * rank_mu
         return change
 
     def _path(
@@ -424,17 +420,11 @@ class NormalDistribution:
 
     def _widen_integers(self) -> None:
         """Widen the scales of integers so that some samples have other values."""
-        require_room_for_scipy()
-        from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
-
-        away = float(-ndtri(_OTHERS / self._size))
-        for j in np.flatnonzero(self._space.integer).tolist():
-            last = float(self._space.span[j])
-            value = min(max(round(float(self.state.mean[j]) * last), 0), round(last))
-            edges = [value - 0.5] * (value > 0) + [value + 0.5] * (value < last)
-            nearest = min(abs(float(self.state.mean[j]) * last - edge) for edge in edges) / last
-            least = nearest / away / self.state.sigma
-            self.state.scale[j] = max(self.state.scale[j], least)
+        integers, state = self._integers, self.state
+        span = self._space.span[integers]
+        nearest = np.abs(state.mean[integers] * span - self._borders()[0]) / span
+        least = nearest / -normal_quantiles(_OTHERS / self._size) / state.sigma
+        state.scale[integers] = np.maximum(state.scale[integers], least)
 
     def _borders(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Return of every integer the border to the value next to the mean's, how many standard
@@ -469,12 +459,9 @@ class NormalDistribution:
 
     def _keep_near_borders(self, before: Floats, mutated: NDArray[np.bool_]) -> None:
         """Keep the mean of every integer within reach of a border."""
-        require_room_for_scipy()
-        from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
-
         integers = self._integers
         span, count = self._space.span[integers], len(integers) + len(self._chosen)
-        farthest = float(-ndtri(0.5 * (1.0 - (1.0 - _MUTATED) ** (1.0 / count))))
+        farthest = float(-normal_quantiles(0.5 * (1.0 - (1.0 - _MUTATED) ** (1.0 / count))))
         least = 0.5 / farthest / span / self.state.sigma
         self.state.scale[integers] = np.maximum(self.state.scale[integers], least)
         border, distance, is_outermost = self._borders()

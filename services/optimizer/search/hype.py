@@ -16,14 +16,15 @@ from gaitswarm.services.optimizer.search.differential_evolution import (
     with_choices,
     without_duplicates,
 )
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_fitness
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.stateful import (
+from gaitswarm.services.optimizer.search.optimizer import (
     Fitness,
     Generational,
     GenerationState,
     Points,
+    SearchSettings,
+    checked_fitness,
 )
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.arrays import Floats
 
 Indices = NDArray[np.intp]

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings
-from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
-from gaitswarm.services.optimizer.search.stateful import (
+from gaitswarm.services.optimizer.search.optimizer import (
     Fitness,
     Generational,
     GenerationState,
     Numbers,
     Points,
+    SearchSettings,
 )
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.sim.arrays import Floats
 
 _SCATTER: Final = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,11 +39,9 @@ class RandomNumbers:
 
     def normal(self, *shape: int) -> Floats:
         """Draw numbers of the standard normal distribution; no value exceeds 8.3."""
-        require_room_for_scipy()
-        from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
-
-        middles = (np.floor(self.uniform(*shape) * 2.0**52) + 0.5) * 2.0**-52
-        numbers: Floats = ndtri(middles)
+        numbers: Floats = normal_quantiles(
+            (np.floor(self.uniform(*shape) * 2.0**52) + 0.5) * 2.0**-52
+        )
         return numbers
 
     def index(self, count: int) -> int:
@@ -68,6 +66,14 @@ class RandomNumbers:
     def seed(self) -> int:
         """Draw a seed for a library's own generator, 0 to 2**32 - 1."""
         return int(self.uniform() * 2.0**32)
+
+
+def normal_quantiles(probabilities: Floats | float) -> Any:
+    """Return quantiles of the standard normal distribution."""
+    require_room_for_scipy()
+    from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
+
+    return ndtri(probabilities)
 
 
 def swarm_uniform(seed: int, purpose: int, *, iteration: int, particles: int, count: int) -> Floats:

@@ -17,10 +17,14 @@ from gaitswarm.services.optimizer.search.differential_evolution import (
     DifferentialEvolution,
 )
 from gaitswarm.services.optimizer.search.hype import Hype, HypeSettings
-from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
+from gaitswarm.services.optimizer.search.optimizer import (
+    Optimizer,
+    Proposals,
+    Replayed,
+    SearchSettings,
+)
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.plugins import (
@@ -154,8 +158,7 @@ def random_search(
 ) -> Proposals:
     """Sample designs uniformly in the box, all integers and choices with equal probability."""
     while True:
-        unit = random.uniform(settings.particles, space.dimension)
-        yield space.evenly(unit)
+        yield space.evenly(random.uniform(settings.particles, space.dimension))
 
 
 _BUILT_IN: Final[dict[str, Method]] = {

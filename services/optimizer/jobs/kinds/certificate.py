@@ -16,9 +16,8 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import mean_of_greatest
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
-from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.optimizer import CountedState, Optimizer, Stateful
 from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
-from gaitswarm.services.optimizer.search.stateful import CountedState, Stateful
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown

@@ -21,7 +21,7 @@ from pydantic import Field
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound, simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PreferenceName
 from gaitswarm.services.optimizer.views import Request, View
-from gaitswarm.sim.controllers.joint_pd import LARGEST_GAIN
+from gaitswarm.sim.controllers.linear import LARGEST_GAIN
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.kernel.parameters import GRAVITY

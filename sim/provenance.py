@@ -127,7 +127,8 @@ def simulator_files() -> tuple[Path, ...]:
         sorted(
             file
             for file in _ROOT.rglob("*")
-            if file.suffix in _SUFFIXES and not {file, *file.parents} & set(left_out)
+            if (file.suffix in _SUFFIXES or file.name == "variables.toml")
+            and not {file, *file.parents} & set(left_out)
         )
     )
 

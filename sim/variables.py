@@ -1,14 +1,17 @@
 """Design variables: numbers and choices with bounds and units.
 
-Controllers and gaits declare theirs as data, which a job's design space, the page's form and the
-check of design files all use.
+variables.toml declares those of gaits, controllers, robots and worlds, which a job's design space,
+the page's form and the check of design files all use.
 """
 
 from __future__ import annotations
 
 import math
 import operator
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache, lru_cache
+from importlib import resources
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import (
@@ -205,14 +208,21 @@ class Variable(BaseModel):
         return self.choices[round(number)]
 
 
-def numeric(
-    name: str, low: float, high: float, unit: str, description: str, **options: Any
-) -> Variable:
-    return Variable(name=name, low=low, high=high, unit=unit, description=description, **options)
+@lru_cache(maxsize=1)
+def _tables() -> Mapping[str, Mapping[str, Any]]:
+    file = resources.files("gaitswarm.sim") / "variables.toml"
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
-def categorical(name: str, choices: tuple[str, ...], description: str) -> Variable:
-    return Variable(name=name, kind="categorical", choices=choices, description=description)
+@cache
+def listed_variables(table: str) -> tuple[Variable, ...]:
+    """Return the variables of a table of variables.toml, in its order."""
+    return tuple(Variable(name=name, **fields) for name, fields in _tables()[table].items())
+
+
+def listed_limits(table: str) -> Mapping[str, tuple[float, float]]:
+    """Return the least and largest value of variables that can be simulated, by name."""
+    return {name: (low, high) for name, (low, high) in _tables()["limits"][table].items()}
 
 
 def split_name(name: str) -> tuple[str, str | None]:

@@ -8,9 +8,7 @@ from typing import Annotated, Final, TypeAlias
 from gaitswarm.sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
 from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
 from gaitswarm.sim.controllers.fuzzy_pi_3 import FuzzyPi3
-from gaitswarm.sim.controllers.joint_pd import JointPdController
-from gaitswarm.sim.controllers.linear import PI, PID, P
-from gaitswarm.sim.controllers.servo import ServoController
+from gaitswarm.sim.controllers.linear import LINEAR_CONTROLLERS
 from gaitswarm.sim.plugins import KnownName, Plugin, Registry, check_is, check_name
 
 
@@ -22,15 +20,7 @@ def _accepted(plugin: Plugin, candidate: object) -> Controller:
 
 CONTROLLERS: Final = Registry[Controller](
     "controller",
-    {
-        "fuzzy-pi": FuzzyPi(),
-        "fuzzy-pi-3": FuzzyPi3(),
-        "p": P,
-        "pi": PI,
-        "pid": PID,
-        "joint-pd": JointPdController(),
-        "servo": ServoController(),
-    },
+    {controller.name: controller for controller in (FuzzyPi(), FuzzyPi3(), *LINEAR_CONTROLLERS)},
     _accepted,
 )
 """By name."""

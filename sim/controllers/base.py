@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -163,6 +166,17 @@ class Inference:
     system: Mamdani
     axes: Mapping[str, Axis]
     table: LookupTable
+
+
+@lru_cache(maxsize=1)
+def _published() -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+    file = resources.files("gaitswarm.sim.controllers") / "published.toml"
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def published_designs(controller: str) -> Mapping[str, Mapping[str, float]]:
+    """Return designs from the literature, by the preference or study that they belong to."""
+    return _published().get(controller, {})
 
 
 def names_of(controller: Controller) -> frozenset[str]:

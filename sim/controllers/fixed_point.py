@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from enum import IntEnum
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.variables import Variable
+from gaitswarm.sim.variables import Variable, listed_variables
 
 FRACTION_BITS: Final = 16
 """Of proportional gains and table index scales."""
@@ -22,7 +20,6 @@ INTEGRAL_BITS: Final = 32
 
 CONTROL_PERIOD: Final = 0.002
 """One control tick [s]."""
-
 
 CURRENT_COUNTS: Final = 2079.0
 """Code of one ampere [counts/A], table 4.4."""
@@ -34,26 +31,11 @@ VOLT_COUNTS: Final = 511.0 / 11.3
 """PWM counts of one volt at the nominal supply [counts/V], table 4.4."""
 
 
-class IntegratorUnit(IntEnum):
-    """Unit of an integrator's gain; the thesis's table 4.4 says V/rad."""
+CONVENTIONS: Final = {variable.name: variable for variable in listed_variables("convention")}
+"""Choices that the thesis leaves open, with the defaults for designs that omit them, by name."""
 
-    COUNTS = 0
-    """PWM counts per (error count x second)."""
-    VOLT_PER_RADIAN = 1
-    """V/rad, added at every control tick."""
-    VOLT_PER_RADIAN_SECOND = 2
-    """V/(rad s)."""
-
-
-_DEFAULT_UNIT: Final = IntegratorUnit.COUNTS
-
-INTEGRATOR_UNIT: Final = Variable(
-    name="integrator_unit",
-    kind="categorical",
-    choices=tuple(unit.name.lower() for unit in IntegratorUnit),
-    default=float(_DEFAULT_UNIT),
-    description="Unit of I: PWM counts/(count s), V/rad at every control tick, or V/(rad s).",
-)
+INTEGRATOR_UNIT: Final = CONVENTIONS["integrator_unit"]
+"""Unit of an integrator's gain; the thesis's table 4.4 says V/rad."""
 
 
 def required(design: Mapping[str, float], name: str, *, low: float, high: float) -> float:
@@ -123,17 +105,13 @@ def integral_gain(design: Mapping[str, float]) -> int:
         SimulationInputError: A value is missing or cannot be represented; names the variable.
     """
     gain = required(design, "I", low=0.0, high=100.0)
-    unit = _DEFAULT_UNIT
+    unit = 0
     if INTEGRATOR_UNIT.name in design:
-        unit = IntegratorUnit(required_integer(design, INTEGRATOR_UNIT.name, low=0, high=2))
-    return to_fixed(gain * _COUNTS_PER_TICK[unit], INTEGRAL_BITS)
-
-
-_COUNTS_PER_TICK: Final[Mapping[IntegratorUnit, float]] = MappingProxyType(
-    {
-        IntegratorUnit.COUNTS: CONTROL_PERIOD,
-        IntegratorUnit.VOLT_PER_RADIAN: VOLT_COUNTS / ANGLE_COUNTS,
-        IntegratorUnit.VOLT_PER_RADIAN_SECOND: VOLT_COUNTS / ANGLE_COUNTS * CONTROL_PERIOD,
-    }
-)
-"""One of the unit, in PWM counts per (error count x tick)."""
+        unit = required_integer(design, INTEGRATOR_UNIT.name, low=0, high=2)
+    # In PWM counts/(count s), V/rad at every control tick, and V/(rad s).
+    per_tick = (
+        CONTROL_PERIOD,
+        VOLT_COUNTS / ANGLE_COUNTS,
+        VOLT_COUNTS / ANGLE_COUNTS * CONTROL_PERIOD,
+    )
+    return to_fixed(gain * per_tick[unit], INTEGRAL_BITS)

@@ -3,67 +3,134 @@
 The inputs of the proportional part are the angle error and the absolute motor current; a high
 current reverses the motor, which protects motor and battery (thesis table 4.3). Simulations use the
 table of the robot: 10 bit x 6 bit with 8-bit outputs (section 5.3).
+
+The thesis draws but does not list the membership functions. Choices that the drawings leave open
+are conventions, which a design may set. With the default sets, table 4.3's own weights and the
+published optima A and B reverse the drive at extreme current, as in 4.3.2 and fig. 4.5; see
+docs/model.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
-import numpy as np
-
-from gaitswarm.sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
+from gaitswarm.sim.controllers.base import (
+    ControlLaw,
+    Inference,
+    LookupTable,
+    Universe,
+    published_designs,
+)
 from gaitswarm.sim.controllers.fixed_point import (
+    CONVENTIONS,
     FRACTION_BITS,
-    INTEGRATOR_UNIT,
+    given_or_default,
     integral_gain,
     required,
     required_integer,
     to_fixed,
 )
-from gaitswarm.sim.controllers.fuzzy_sets import (
-    EXTREME_PEAK,
-    LARGE_BEGINS,
-    POSITIVE_PEAK,
-    SIGNED,
-    SMALL_ENDS,
-    UNIVERSE,
-    MembershipSets,
-)
-from gaitswarm.sim.controllers.mamdani import Mamdani, Rule, Shape
+from gaitswarm.sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
 from gaitswarm.sim.controllers.quantisation import Axis, ExactInference, Quantised, quantised
-from gaitswarm.sim.variables import Variable
+from gaitswarm.sim.variables import Variable, listed_limits, listed_variables
 
 ERROR: Final = Axis(bits=10, centred=True)
 CURRENT: Final = Axis(bits=6, centred=False)
 
-_CONVENTIONS: Final = (
-    INTEGRATOR_UNIT,
-    LARGE_BEGINS,
-    SMALL_ENDS,
-    POSITIVE_PEAK,
-    EXTREME_PEAK,
-    UNIVERSE,
+SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
+    {"negative": FuzzySet(-1.0, 1.0), "zero": FuzzySet(0.0, 1.0), "positive": FuzzySet(1.0, 1.0)}
 )
+"""Sets of an angle or velocity error."""
 
-_COLUMNS: Final = ("I", "FI1R", "FI2R", "FOR", "FOMF", "FW1", "FW23", "FW4", "FW56")
+_LIMITS: Final = listed_limits("convention")
 
-_PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
-    {
-        name: MappingProxyType(dict(zip(_COLUMNS, row, strict=True)))
-        for name, row in (
-            ("A", (0.171, 5837.0, 20111.0, 781.0, 2.0, 0.187, 0.961, 0.789, 0.927)),
-            ("B", (0.160, 5400.0, 18693.0, 500.0, 3.0, 0.347, 0.972, 0.592, 0.814)),
-            ("C", (0.607, 5629.0, 18242.0, 527.0, 3.0, 0.581, 0.889, 0.702, 0.188)),
+
+@dataclass(frozen=True, slots=True)
+class MembershipSets:
+    """Sets of a current's absolute value and of an output, by the conventions of the same names."""
+
+    large_begins: float
+    small_ends: float
+    positive_peak: float
+    universe: float
+    extreme_peak: float | None = None  # None for an output without extremes
+
+    @classmethod
+    def of(cls, design: Mapping[str, float], conventions: Iterable[Variable]) -> MembershipSets:
+        return cls(
+            **{
+                variable.name: given_or_default(design, variable, *_LIMITS[variable.name])
+                for variable in conventions
+                if variable.name in _LIMITS
+            }
         )
-    }
-)
-"""Optima of table 4.6, by preference."""
 
-DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
+    @property
+    def amount(self) -> dict[str, FuzzySet]:
+        """Sets of a current's absolute value."""
+        return {
+            "small": FuzzySet(0.0, self.small_ends),
+            "large": FuzzySet(1.0, 1.0 - self.large_begins),
+        }
+
+    @property
+    def output(self) -> dict[str, FuzzySet]:
+        """Sets of the output."""
+        peaks = {"null": 0.0, "positive": self.positive_peak, "negative": -self.positive_peak}
+        if self.extreme_peak is not None:
+            peaks["positive-extreme"] = self.extreme_peak
+            peaks["negative-extreme"] = -self.extreme_peak
+        return {name: FuzzySet(peak, self.positive_peak) for name, peak in peaks.items()}
+
+
+System = Callable[..., Mamdani]
+"""Returns an inference for the weights of its rules, the outputs' shape, and sets."""
+
+
+@lru_cache(maxsize=384)
+def _table(
+    system: System,
+    weights: tuple[float, ...],
+    shape: Shape,
+    sets: MembershipSets,
+    axes: tuple[tuple[str, Axis], ...],
+) -> Quantised:
+    return quantised(system(*weights, shape, sets), dict(axes))
+
+
+def tabulated(
+    system: System,
+    weights: Sequence[float],
+    shape: Shape,
+    sets: MembershipSets,
+    inputs: Mapping[str, Universe],
+    axes: Mapping[str, Axis],
+    output: Universe,
+) -> Inference:
+    """Return an inference with its table; `counts` of the output are fixed-point ones."""
+    table = _table(system, tuple(weights), shape, sets, tuple(axes.items()))
+    gains = {
+        f"{name}_gain": axes[name].gain(universe.full_range * universe.counts)
+        for name, universe in inputs.items()
+    }
+    return Inference(
+        output=output,
+        inputs=inputs,
+        system=system(*weights, shape, sets),
+        axes=axes,
+        table=LookupTable(
+            values=table.values.reshape((*table.values.shape, 1)[:3]),
+            output_gain=to_fixed(output.full_range * output.counts * table.step, 0),
+            **gains,
+        ),
+    )
+
+
+DEFAULT_SETS: Final = MembershipSets.of({}, CONVENTIONS.values())
 
 
 def inference_system(
@@ -87,22 +154,6 @@ def inference_system(
     return Mamdani(inputs, sets.output, rules, shape, sets.universe)
 
 
-@lru_cache(maxsize=192)
-def quantised_table(
-    fw1: float,
-    fw23: float,
-    fw4: float,
-    fw56: float,
-    shape: Shape,
-    sets: MembershipSets = DEFAULT_SETS,
-    error: Axis = ERROR,
-    current: Axis = CURRENT,
-) -> Quantised:
-    """Return the inference of `inference_system` as (n_error, n_current) 8-bit values."""
-    system = inference_system(fw1, fw23, fw4, fw56, shape, sets)
-    return quantised(system, {"error": error, "current": current})
-
-
 class FuzzyPi:
     """The Fuzzy-PI of chapter 4."""
 
@@ -111,50 +162,9 @@ class FuzzyPi:
         "Fuzzy-PI of chapter 4: fuzzy-P of angle error and motor current as a 10x6x8 bit table,"
         " plus an integrator."
     )
-    variables: Final = (
-        Variable(
-            name="I",
-            low=0.1,
-            high=1.0,
-            unit="PWM counts/(count s)",
-            description="Gain of the integrator.",
-        ),
-        Variable(
-            name="FI1R", low=1500, high=6000, unit="counts", description="Range of the angle error."
-        ),
-        Variable(
-            name="FI2R", low=6000, high=24000, unit="counts", description="Range of the current."
-        ),
-        Variable(
-            name="FOR", low=500, high=2000, unit="PWM counts", description="Range of the output."
-        ),
-        Variable(
-            name="FOMF",
-            low=1,
-            high=3,
-            unit="1",
-            kind="integer",
-            description="Output membership functions: 1 triangle, 2 Gauss, 3 pi.",
-        ),
-        Variable(name="FW1", low=0.1, high=1.0, description="Weight of rule 1: zero -> null."),
-        Variable(
-            name="FW23", low=0.1, high=1.0, description="Weight of rules 2, 3: follow the error."
-        ),
-        Variable(
-            name="FW4",
-            low=0.1,
-            high=1.0,
-            description="Weight of rule 4: zero, current small -> null.",
-        ),
-        Variable(
-            name="FW56",
-            low=0.1,
-            high=1.0,
-            description="Weight of rules 5, 6: current large -> reverse.",
-        ),
-    )
-    conventions: Final = _CONVENTIONS
-    published: Final[Mapping[str, Mapping[str, float]]] = _PUBLISHED
+    variables: Final = listed_variables("fuzzy-pi")
+    conventions: Final = tuple(CONVENTIONS.values())
+    published: Final = published_designs("fuzzy-pi")
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         return self.compile_with(design, ERROR, CURRENT)
@@ -167,22 +177,11 @@ class FuzzyPi:
             error: Axis of the error.
             current: Axis of the current.
         """
-        p = _Parameters.of(design)
-        return ControlLaw(integral_gain=p.integral, direct=p.table(error, current))
+        table = self._inference(design, error, current).table
+        return ControlLaw(integral_gain=integral_gain(design), direct=table)
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        p = _Parameters.of(design)
-        fuzzy_p = Inference(
-            output=Universe("FO", "PWM counts", p.output_range, counts=1 << FRACTION_BITS),
-            inputs={
-                "error": Universe("error", "counts", p.error_range),
-                "current": Universe("current", "counts", p.current_range),
-            },
-            system=inference_system(*p.weights, p.shape, p.sets),
-            axes={"error": ERROR, "current": CURRENT},
-            table=p.table(ERROR, CURRENT),
-        )
-        return (fuzzy_p,)
+        return (self._inference(design, ERROR, CURRENT),)
 
     def without_table(self, design: Mapping[str, float]) -> ControlLaw:
         """Compile the controller with full inference, for the reference kernel only.
@@ -190,44 +189,25 @@ class FuzzyPi:
         Args:
             design: Value of every variable, by name.
         """
-        p = _Parameters.of(design)
-        system = inference_system(*p.weights, p.shape, p.sets)
-        exact = ExactInference(system, p.error_range, p.current_range, p.output_range)
-        return ControlLaw(integral_gain=p.integral, direct=exact)
+        fuzzy = self._inference(design, ERROR, CURRENT)
+        error, current = (fuzzy.inputs[name].full_range for name in ("error", "current"))
+        exact = ExactInference(fuzzy.system, error, current, fuzzy.output.full_range)
+        return ControlLaw(integral_gain=integral_gain(design), direct=exact)
 
-
-@dataclass(frozen=True, slots=True)
-class _Parameters:
-    """A design's checked values. weights: FW1, FW23, FW4, FW56."""
-
-    integral: int
-    error_range: float
-    current_range: float
-    output_range: float
-    weights: tuple[float, float, float, float]
-    shape: Shape
-    sets: MembershipSets
-
-    @classmethod
-    def of(cls, design: Mapping[str, float]) -> _Parameters:
-        fw1, fw23, fw4, fw56 = (
-            required(design, name, low=0.0, high=1.0) for name in ("FW1", "FW23", "FW4", "FW56")
-        )
-        return cls(
-            integral=integral_gain(design),
-            error_range=required(design, "FI1R", low=64.0, high=65535.0),
-            current_range=required(design, "FI2R", low=64.0, high=65535.0),
-            output_range=required(design, "FOR", low=1.0, high=32767.0),
-            weights=(fw1, fw23, fw4, fw56),
-            shape=Shape(required_integer(design, "FOMF", low=1, high=3)),
-            sets=MembershipSets.of(design, _CONVENTIONS),
-        )
-
-    def table(self, error: Axis, current: Axis) -> LookupTable:
-        table = quantised_table(*self.weights, self.shape, self.sets, error, current)
-        return LookupTable(
-            values=table.values[:, :, np.newaxis],
-            output_gain=to_fixed(self.output_range * table.step, FRACTION_BITS),
-            error_gain=error.gain(self.error_range),
-            current_gain=current.gain(self.current_range),
+    def _inference(self, design: Mapping[str, float], error: Axis, current: Axis) -> Inference:
+        names = ("FW1", "FW23", "FW4", "FW56")
+        weights = [required(design, name, low=0.0, high=1.0) for name in names]
+        ranges = {
+            name: Universe(name, "counts", required(design, variable, low=64.0, high=65535.0))
+            for name, variable in (("error", "FI1R"), ("current", "FI2R"))
+        }
+        full_range = required(design, "FOR", low=1.0, high=32767.0)
+        return tabulated(
+            inference_system,
+            weights,
+            Shape(required_integer(design, "FOMF", low=1, high=3)),
+            MembershipSets.of(design, self.conventions),
+            ranges,
+            {"error": error, "current": current},
+            Universe("FO", "PWM counts", full_range, counts=1 << FRACTION_BITS),
         )

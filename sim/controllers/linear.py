@@ -1,13 +1,12 @@
-"""P, PI and PID controllers in coded units (thesis 2.2.2, 3.4)."""
+"""Controllers without tables: P, PI and PID, joint PD, and P of servos."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
-from gaitswarm.sim.controllers.base import ControlLaw, Inference
+from gaitswarm.sim.controllers.base import ControlLaw, Inference, JointPd, published_designs
 from gaitswarm.sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     FRACTION_BITS,
@@ -16,73 +15,101 @@ from gaitswarm.sim.controllers.fixed_point import (
     required,
     to_fixed,
 )
-from gaitswarm.sim.variables import Variable
+from gaitswarm.sim.variables import Variable, listed_variables
 
-_P: Final = Variable(
-    name="P", low=0.05, high=1.0, unit="PWM counts/count", description="Proportional gain."
-)
-_I: Final = Variable(
-    name="I", low=0.0, high=1.0, unit="PWM counts/(count s)", description="Integral gain."
-)
-_D: Final = Variable(
-    name="D", low=0.0, high=0.02, unit="PWM counts s/count", description="Derivative gain."
-)
+LARGEST_GAIN: Final = 1e5
+"""Largest gain of a joint PD that can be simulated [N m/rad], [N m s/rad]."""
+
+LARGEST_P: Final = 32767
+"""Largest P of servos that can be simulated [units of a register of 16 bits]."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinearController:
-    """PWM = P error + I integral of error dt + D derivative of error; missing terms are zero."""
+    """A controller whose output is linear in the error, its integral and its derivative."""
 
     name: str
     description: str
-    variables: tuple[Variable, ...]
-    conventions: tuple[Variable, ...]  # the unit of the integrator, if it has one
-    published: Mapping[str, Mapping[str, float]]  # designs from the literature, by study
+    law: Callable[[Mapping[str, float]], ControlLaw]
+    conventions: tuple[Variable, ...] = ()  # the unit of the integrator, if it has one
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        return listed_variables(self.name)
+
+    @property
+    def published(self) -> Mapping[str, Mapping[str, float]]:
+        return published_designs(self.name)
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}
-        return ControlLaw(
-            proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
-            integral_gain=integral_gain(design) if "I" in gains else 0,
-            derivative_gain=to_fixed(gains.get("D", 0.0) / CONTROL_PERIOD, FRACTION_BITS),
-        )
+        return self.law(design)
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
         del design
         return ()
 
 
-P: Final = LinearController(
-    "p",
-    "P on the angle error, in coded units (thesis 2.2.2); the robot's drive of 2011.",
-    (_P,),
-    (),
-    MappingProxyType({"2011": MappingProxyType({"P": 0.25})}),
-)
-_GAIT: Final = ("P", "I", "cycle_time", "stride", "height", "duty_factor", "fir_ms")
+def _pid(terms: str) -> Callable[[Mapping[str, float]], ControlLaw]:
+    """PWM = P error + I integral of error dt + D derivative of error; missing terms are zero."""
 
-# Optima of table 3.5, each with the gait tuned together with it.
-_TUNED: Final = {
-    "pi-pso-ps": (0.454, 0.147, 1.808, 0.168, 0.0397, 0.574, 93.0),
-    "pi-pso": (0.340, 0.534, 1.696, 0.142, 0.0366, 0.577, 9.0),
-}
+    def law(design: Mapping[str, float]) -> ControlLaw:
+        gains = {name: required(design, name, low=0.0, high=100.0) for name in terms}
+        return ControlLaw(
+            proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
+            integral_gain=integral_gain(design) if "I" in gains else 0,
+            derivative_gain=to_fixed(gains.get("D", 0.0) / CONTROL_PERIOD, FRACTION_BITS),
+        )
 
-PI: Final = LinearController(
-    "pi",
-    "PI on the angle error, in coded units (thesis 2.2.2, 3.4).",
-    (_P, _I),
-    (INTEGRATOR_UNIT,),
-    MappingProxyType(
-        {
-            **{k: MappingProxyType(dict(zip(_GAIT, v, strict=True))) for k, v in _TUNED.items()},
-            "validation": MappingProxyType({"P": 0.25, "I": 0.0}),
-        }
+    return law
+
+
+def _joint_pd(design: Mapping[str, float]) -> ControlLaw:
+    """tau = K_p (q_d - q) + K_d (dq_d - dq) + share of the torque that carries the robot.
+
+    The law of the low-level interfaces of the MIT Mini Cheetah (Katz, Di Carlo, Kim 2019), Solo
+    (Grimminger et al. 2020) and commercial quadrupeds.
+    """
+    stiffness, damping = (required(design, k, low=0.0, high=LARGEST_GAIN) for k in ("Kp", "Kd"))
+    share = required(design, "feed_forward", low=-10.0, high=10.0)
+    return ControlLaw(joint_pd=JointPd(stiffness, damping, share))
+
+
+def _servo(design: Mapping[str, float]) -> ControlLaw:
+    """Servos follow the gait's joint angles with P, a dead band and a PWM limit.
+
+    Robots have P in units of their servos' register, and bounds for it in job.json.
+    """
+    return ControlLaw(servo=required(design, "P", low=0.0, high=LARGEST_P))
+
+
+LINEAR_CONTROLLERS: Final = (
+    LinearController(
+        "p",
+        "P on the angle error, in coded units (thesis 2.2.2); the robot's drive of 2011.",
+        _pid("P"),
     ),
-)
-PID: Final = LinearController(
-    "pid",
-    "PID on the angle error, in coded units (thesis 2.2.2, 3.4).",
-    (_P, _I, _D),
-    (INTEGRATOR_UNIT,),
-    MappingProxyType({}),
+    LinearController(
+        "pi",
+        "PI on the angle error, in coded units (thesis 2.2.2, 3.4).",
+        _pid("PI"),
+        (INTEGRATOR_UNIT,),
+    ),
+    LinearController(
+        "pid",
+        "PID on the angle error, in coded units (thesis 2.2.2, 3.4).",
+        _pid("PID"),
+        (INTEGRATOR_UNIT,),
+    ),
+    LinearController(
+        "joint-pd",
+        "PD on joint angle and speed with feed-forward of the weight, in the torque-controlled"
+        " actuators at their own rate; needs such actuators.",
+        _joint_pd,
+    ),
+    LinearController(
+        "servo",
+        "Joint angles for position-controlled servos, whose firmware multiplies the error by P;"
+        " needs such servos.",
+        _servo,
+    ),
 )

@@ -9,89 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final, TypeVar, get_args
+from typing import Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.robot.actuators import Actuator, TorqueActuator
-from gaitswarm.sim.robot.description import (
-    ContactLaw,
-    EnergyConvention,
-    Leg,
-    PlannedSoles,
-    RobotDescription,
-)
+from gaitswarm.sim.robot.description import Leg, RobotDescription
 from gaitswarm.sim.robot.robot import Robot
-from gaitswarm.sim.variables import Variable, categorical, numeric
+from gaitswarm.sim.variables import Variable, listed_variables
 
-_WHOLE: Final = (
-    numeric("battery_voltage", 8.0, 13.0, "V", "Open-circuit voltage of the battery."),
-    numeric("battery_resistance", 0.02, 0.6, "ohm", "Internal resistance of the battery."),
-    numeric("body_mass", 2.0, 6.0, "kg", "Mass of the body."),
-)
-
-_EFFICIENCY: Final = numeric("efficiency", 0.25, 0.98, "1", "Efficiency of the gearhead of")
-
-_FRICTION: Final = numeric(
-    "viscous_friction",
-    0.0,
-    0.5,
-    "N m s/rad",
-    "Viscous friction of the torque-controlled actuator of",
-)
-
-_CONTACT: Final = {
-    "stiffness": numeric("stiffness", 1000.0, 20_000.0, "N/m", "Stiffness of the sole of"),
-    "damping": numeric("damping", 50.0, 3000.0, "N s/m", "Damping of the sole of"),
-    "sole": numeric("sole", 0.004, 0.016, "m", "Length of the sole's spring of"),
-    "friction": numeric("friction", 0.05, 3.0, "1", "Friction of the foot of"),
-}
+_OF_LEGS: Final = listed_variables("robot_leg")
+"""Contact parameters; their descriptions end with the name of the leg."""
 
 _DRY_FRICTION: Final = ("coulomb_friction", "stribeck_friction", "load_friction")
 
-CONVENTIONAL_VARIABLES: Final = (
-    numeric(
-        "efficiency",
-        _EFFICIENCY.low,
-        _EFFICIENCY.high,
-        "1",
-        "Efficiency of every gearhead; that of a single joint takes precedence.",
-    ),
-    numeric("coulomb_friction", 0.0, 1.0, "N m", "Dry friction of every gearhead, at its output."),
-    numeric("stribeck_friction", 0.0, 1.0, "N m", "Further dry friction at rest."),
-    numeric(
-        "load_friction",
-        0.0,
-        0.5,
-        "1",
-        "Dry friction of every gearhead per torque on both its sides.",
-    ),
-    categorical(
-        "energy", get_args(EnergyConvention), "Electrical power of each motor that counts as spent."
-    ),
-    categorical("contact_law", get_args(ContactLaw), "Friction law of the soles."),
-    numeric(
-        "slip_velocity",
-        0.01,
-        0.2,
-        "m/s",
-        "Velocity from which friction of every foot is full (v_lin).",
-    ),
-    numeric(
-        "current_filter",
-        0.0,
-        0.05,
-        "s",
-        "Time constant of the low-pass of the current before the ADC.",
-    ),
-    categorical(
-        "planned_soles",
-        get_args(PlannedSoles),
-        "Sole lengths that gaits assume: nominal, or each leg's own.",
-    ),
-)
+CONVENTIONAL_VARIABLES: Final = listed_variables("robot_convention")
 """Values for the whole robot that the thesis omits, or gives more than once."""
 
 
@@ -99,11 +33,12 @@ CONVENTIONAL_VARIABLES: Final = (
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
     """Return all parameters in the order of table 2.7, with bounds around its values."""
     legs = robot.description.legs
-    losses = _FRICTION if robot.is_torque_controlled else _EFFICIENCY
+    efficiency, friction = listed_variables("robot_joint")
+    losses = friction if robot.is_torque_controlled else efficiency
     return (
-        *_WHOLE,
+        *listed_variables("robot"),
         *(_named(losses, joint) for joint in robot.joint_names),
-        *(_named(variable, leg.name) for variable in _CONTACT.values() for leg in legs),
+        *(_named(variable, leg.name) for variable in _OF_LEGS for leg in legs),
     )
 
 
@@ -207,7 +142,7 @@ def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescrip
                 )
                 actuators[own] = actuator.model_copy(update={"gearhead": own})
                 names[index] = own
-        by_field = {field: f"{field}_{leg.name}" for field in _CONTACT}
+        by_field = {variable.name: f"{variable.name}_{leg.name}" for variable in _OF_LEGS}
         own_contact = leg.contact
         if not values.keys().isdisjoint(by_field.values()):
             own_contact = _changed(leg.contact or d.contact, by_field, values)

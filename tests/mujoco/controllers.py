@@ -8,8 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.controllers.fuzzy_pi import quantised_table
+from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from gaitswarm.sim.controllers.mamdani import Shape
+from gaitswarm.sim.controllers.quantisation import quantised
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.robot.robot import Robot
 from tests.mujoco.walker import CONTROL_PERIOD, Floats
@@ -62,12 +63,13 @@ class FuzzyPi(Coded):
 
     def __init__(self, robot: Robot, log: WalkLog, design: Mapping[str, float]) -> None:
         super().__init__(robot, log, design)
-        weights = (design[name] for name in ("FW1", "FW23", "FW4", "FW56"))
-        quantised = quantised_table(*weights, Shape(int(design["FOMF"])))
-        self._table = quantised.values.astype(np.int64)
+        fw1, fw23, fw4, fw56 = (design[name] for name in ("FW1", "FW23", "FW4", "FW56"))
+        system = inference_system(fw1, fw23, fw4, fw56, Shape(int(design["FOMF"])))
+        table = quantised(system, {"error": ERROR, "current": CURRENT})
+        self._table = table.values.astype(np.int64)
         self._row = round(511 / design["FI1R"] * 2**16)
         self._column = round(63 / design["FI2R"] * 2**16)
-        self._output = round(design["FOR"] * quantised.largest / 127 * 2**16)
+        self._output = round(design["FOR"] * table.largest / 127 * 2**16)
 
     def proportional(self, error: Ints, load: Ints) -> Ints:
         row = np.clip(512 + _shifted(error * self._row, 16), 0, 1023)

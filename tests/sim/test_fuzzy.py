@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from gaitswarm.sim.compiler.compilation import Target, load_library, target
 from gaitswarm.sim.controllers import CONTROLLERS, control_law
 from gaitswarm.sim.controllers.base import LookupTable
-from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
+from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, MembershipSets, inference_system
 from gaitswarm.sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
-from gaitswarm.sim.controllers.fuzzy_sets import MembershipSets
 from gaitswarm.sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
 from gaitswarm.sim.controllers.quantisation import (
     Axis,
+    Quantised,
     compiled_table,
     inference_source,
     quantised,
@@ -33,6 +33,11 @@ WEIGHTS = st.floats(0.1, 1.0)
 SETS = MembershipSets(
     large_begins=0.3, small_ends=0.8, positive_peak=0.6, universe=1.5, extreme_peak=1.4
 )
+
+
+def fuzzy_p_table(fw1: float, fw23: float, fw4: float, fw56: float, shape: Shape) -> Quantised:
+    system = inference_system(fw1, fw23, fw4, fw56, shape)
+    return quantised(system, {"error": ERROR, "current": CURRENT})
 
 
 def scikit_fuzzy_union(e: float, c: float, w: tuple[float, ...], shape: Shape) -> np.ndarray:
@@ -212,7 +217,7 @@ def test_a_system_too_large_for_the_compiled_code_is_still_inferred(sets: int, r
 
 
 def test_table_is_odd_in_the_error_and_follows_it() -> None:
-    table = quantised_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).values.astype(int)
+    table = fuzzy_p_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).values.astype(int)
     assert table.shape == (1024, 64)
     assert not table[512].any()
     np.testing.assert_array_equal(table[1:512], -table[:512:-1])
@@ -221,7 +226,7 @@ def test_table_is_odd_in_the_error_and_follows_it() -> None:
 
 
 def test_high_current_reverses_the_motor() -> None:
-    table = quantised_table(0.2, 0.3, 0.2, 1.0, Shape.TRIANGLE).values.astype(int)
+    table = fuzzy_p_table(0.2, 0.3, 0.2, 1.0, Shape.TRIANGLE).values.astype(int)
     assert table[-1, 0] > 0 > table[-1, 63]
 
 
@@ -229,7 +234,7 @@ def test_quantisation_error_is_half_a_step() -> None:
     exact = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).infer(
         {"error": ERROR.grid(), "current": CURRENT.grid()}
     )
-    table = quantised_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
+    table = fuzzy_p_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
     assert table.largest == np.abs(exact).max()
     assert np.abs(exact - table.values * table.step).max() <= 0.5 * table.step + 1e-12
 
@@ -249,7 +254,7 @@ def test_the_laws_scales_are_those_of_the_ranges() -> None:
     assert isinstance(table, LookupTable)
     assert (5837 * table.error_gain + (1 << 15)) >> 16 == 511
     assert (20111 * table.current_gain + (1 << 15)) >> 16 == 63
-    largest = quantised_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).largest
+    largest = fuzzy_p_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).largest
     assert (127 * table.output_gain + (1 << 15)) >> 16 == round(781 * largest)
     # 0.171 PWM counts per count and second, at 500 Hz, in 32 fractional bits.
     assert law.integral_gain == round(0.171 * 0.002 * 2**32)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.parameters import Layout, pack_parameters
 from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.description import ContactLaw, EnergyConvention, PlannedSoles
 from gaitswarm.sim.robot.identifiable import (
     CONVENTIONAL_VARIABLES,
     identifiable_variables,
@@ -135,6 +138,15 @@ CHOICES = [
     for variable in CONVENTIONAL_VARIABLES
     for index, choice in enumerate(variable.choices)
 ]
+
+
+def test_conventions_have_the_choices_of_the_description() -> None:
+    choices = {v.name: v.choices for v in CONVENTIONAL_VARIABLES if v.choices}
+    assert choices == {
+        "energy": get_args(EnergyConvention),
+        "contact_law": get_args(ContactLaw),
+        "planned_soles": get_args(PlannedSoles),
+    }
 
 
 def test_conventions_are_next_to_the_identified_parameters() -> None:

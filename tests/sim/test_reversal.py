@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import Inference
-from gaitswarm.sim.controllers.fuzzy_sets import LARGE_BEGINS
+from gaitswarm.sim.controllers.fixed_point import CONVENTIONS
 
 FUZZY: Final = CONTROLLERS["fuzzy-pi"]
 
@@ -36,7 +36,9 @@ REVERSING: Final[Mapping[str, Mapping[str, float]]] = {
 CURRENTS: Final = np.linspace(0.0, 1.0, 64)
 """Shares of the current's range, at the columns of the table."""
 
-LARGE: Final = (LARGE_BEGINS.default or 0.0) < CURRENTS
+LARGE_BEGINS: Final = CONVENTIONS["large_begins"].default or 0.0
+
+LARGE: Final = LARGE_BEGINS < CURRENTS
 
 
 def inferred(source: Inference, error: float) -> Floats:
@@ -98,9 +100,8 @@ def test_a_drive_follows_its_error_until_currents_are_large_then_falls_and_rever
         np.testing.assert_allclose(follows, follows[0])
         assert (falls < follows[0]).all()
         turns.append(CURRENTS[int(np.argmax(output < 0.0))])
-    assert LARGE_BEGINS.default is not None
     # The larger the error, the more current it takes; half of the range is enough for any.
-    assert LARGE_BEGINS.default < turns[0] < turns[1] < turns[2] <= 0.5
+    assert LARGE_BEGINS < turns[0] < turns[1] < turns[2] <= 0.5
 
 
 @pytest.mark.parametrize("name", REVERSING)

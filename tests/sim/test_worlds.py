@@ -18,12 +18,13 @@ from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.kernel.parameters import GRAVITY
+from gaitswarm.sim.kernel.sensors import LARGEST_DELAY
 from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
 from gaitswarm.sim.robot.identifiable import with_parameters
 from gaitswarm.sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
 from gaitswarm.sim.simulate import plan_of_scenario
-from gaitswarm.sim.worlds.perturbations import DRAWN, sample_worlds
+from gaitswarm.sim.worlds.perturbations import DRAWN, LIMITS, sample_worlds
 from gaitswarm.sim.worlds.walks import MeasuredPerturbedWalk, PerturbedWalk, WorldWalk
 from tests.examples.walks import PUBLISHED_A, quadruped_files, short_walk, walk
 
@@ -255,6 +256,10 @@ def test_bounds_of_table_2_7_span_the_intervals_of_all_legs() -> None:
         # Rounded outwards.
         assert low <= np.min(spans[name]) < low + 0.01
         assert high - 0.01 < np.max(spans[name]) <= high
+
+
+def test_readings_may_be_as_late_as_the_kernel_allows() -> None:
+    assert LIMITS["angle_delay"] == LIMITS["current_delay"] == (0.0, LARGEST_DELAY)
 
 
 def test_every_perturbation_matters() -> None:

@@ -276,7 +276,9 @@ class JobSummaryView(View):
         examples=[0],
     )
     created_at: datetime = Field(description="When it was submitted, UTC.")
-    updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
+    updated_at: datetime = Field(
+        description="When its state, progress or waiting last changed, UTC."
+    )
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(

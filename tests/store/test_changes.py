@@ -12,7 +12,7 @@ import pytest
 from gaitswarm.services.optimizer.jobs.job import Command
 from gaitswarm.services.optimizer.store import Store, open_store
 from tests.examples.processes import eventually
-from tests.store.examples import LEASE, ask, begun, completed, spec
+from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.postgres_server import PostgresServer
 
 POLL_SECONDS = 0.02
@@ -61,6 +61,19 @@ def test_what_a_job_waits_for_is_reported_once(store: Store, waiting: Store) -> 
         store.command(other.id, Command.CANCEL)
         assert theirs.wait(10.0)
         assert not mine.is_set()
+
+
+def test_a_change_there_and_back_between_two_polls_is_reported(
+    store: Store, waiting: Store, clock: Clock
+) -> None:
+    claim = begun(store)
+    woken = threading.Event()
+    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=1.0):
+        settle(waiting, woken)
+        clock.advance(1.0)
+        store.renew(claim, lease_seconds=LEASE, waiting="no route to host")
+        store.renew(claim, lease_seconds=LEASE)
+        assert woken.wait(10.0)
 
 
 def test_neither_heartbeats_nor_other_jobs_are_reported(store: Store, waiting: Store) -> None:

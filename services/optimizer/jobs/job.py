@@ -214,7 +214,7 @@ class Job:
     stored_spec: AnySpec | UnreadableSpec
     state: JobState
     created_at: datetime
-    updated_at: datetime  # time of the last change of state or progress
+    updated_at: datetime  # time of the last change of state, progress or `waiting`
     started_at: datetime | None = None
     finished_at: datetime | None = None
     error: str | None = None

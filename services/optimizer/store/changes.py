@@ -114,9 +114,10 @@ class Changes:
         """Wake watchers of jobs that changed since the last poll."""
         with self._condition:
             watched = {watcher.job_id for watcher in self._watchers}
-        columns = (jobs.c.id, jobs.c.state, jobs.c.iterations, jobs.c.waiting)
+        # The time tells two changes, back and forth, from none.
+        names = ("id", "state", "iterations", "waiting", "updated_at")
+        query = select(*(jobs.c[name] for name in names)).where(jobs.c.id.in_(watched), EXISTING)
         with self._database.read() as connection:
-            query = select(*columns).where(jobs.c.id.in_(watched), EXISTING)
             rows = connection.execute(query).all()
         states = dict.fromkeys(watched) | {row.id: tuple(row) for row in rows}
         changed = {j for j in watched if j not in self._seen or self._seen[j] != states[j]}

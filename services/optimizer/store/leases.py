@@ -107,10 +107,11 @@ class Leases(Aggregate):
     def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> Renewal:
         """Prolong a lease; return the job's state and priority, which users may have changed."""
         with self._held("renew", claim) as (connection, row):
-            changes: dict[str, Any] = _lease(self._clock(connection), lease_seconds)
+            now = self._clock(connection)
+            changes: dict[str, Any] = _lease(now, lease_seconds)
             reason = None if waiting is None else storable(waiting)
             if reason != row["waiting"]:
-                changes["waiting"] = reason
+                changes |= {"waiting": reason, "updated_at": now}
             update_job(connection, row, changes)
             return Renewal(JobState(row["state"]), row["priority"])
 

@@ -18,13 +18,13 @@ from typing import Final, get_args
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.evaluator import TaskReport
+from gaitswarm.services.optimizer.run.runner import run_embedded
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store import Observer, open_store
 from gaitswarm.services.runtime import ObservedEvaluator
 from gaitswarm.services.worker import EvaluatorKind
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.sim.assembly import kernel_of
 from gaitswarm.sim.kernel import Precision

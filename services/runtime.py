@@ -19,16 +19,13 @@ from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER
-from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     Evaluator,
     OnTask,
     TaskReport,
-    Watched,
-    place_of,
 )
-from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.run.runner import Runner, run_embedded
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.worker import EvaluatorKind
@@ -37,8 +34,7 @@ from gaitswarm.sim.outcome import Outcome
 if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
-    from gaitswarm.services.worker.dispatch import Load
-    from gaitswarm.services.worker.in_process import InProcessEvaluator
+    from gaitswarm.services.worker.dispatch import InProcessEvaluator, Load
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 _log = logging.getLogger(__name__)
@@ -53,7 +49,7 @@ def open_evaluator(
     lasting: bool = False,
 ) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
     """Create the evaluator of a kind."""
-    from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
+    from gaitswarm.services.worker.dispatch import InProcessEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
 
     check_address(address)
@@ -144,7 +140,8 @@ class ObservedEvaluator:
 
     @property
     def place(self) -> str | None:
-        return place_of(self._inner)
+        place: str | None = getattr(self._inner, "place", None)
+        return place
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
@@ -176,8 +173,8 @@ class Runtime:
 
     def workers_trouble(self) -> str | None:
         """Why designs cannot be evaluated now; None if they can or it is unknown."""
-        watched: object = self.evaluator
-        return watched.trouble() if isinstance(watched, Watched) else None
+        trouble: Callable[[], str | None] | None = getattr(self.evaluator, "trouble", None)
+        return None if trouble is None else trouble()
 
 
 @contextmanager

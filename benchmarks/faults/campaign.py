@@ -21,7 +21,7 @@ from benchmarks.faults.plan import Planned
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.runtime import run_embedded
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from tests.examples.jobs import Bits, history
 from tests.examples.walks import SHORT_WALK
 

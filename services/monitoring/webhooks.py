@@ -20,6 +20,7 @@ import httpx2
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.notification import Notification, refused_url
+from gaitswarm.services.worker.dispatch import in_daemon
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
@@ -63,17 +64,7 @@ class _Daemons(ThreadPoolExecutor):
     """Makes each call in a daemon thread: no stop waits for a host's address that is not found."""
 
     def submit(self, call: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        future = Future[T]()
-        future.set_running_or_notify_cancel()
-
-        def run() -> None:
-            try:
-                future.set_result(call(*args, **kwargs))
-            except BaseException as error:  # noqa: BLE001 - raised where the result is awaited
-                future.set_exception(error)
-
-        threading.Thread(target=run, name="notification", daemon=True).start()
-        return future
+        return in_daemon("notification", call, *args, **kwargs)
 
 
 class Notifier:

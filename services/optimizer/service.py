@@ -127,8 +127,7 @@ class JobService:
     def submit_embedded(self, spec: Spec) -> Claim:
         """Validate a job and store it claimed by this process."""
         # Slow to import.
-        from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
-        from gaitswarm.services.optimizer.run.runner import runner_name
+        from gaitswarm.services.optimizer.run.runner import EMBEDDED_LEASE_SECONDS, runner_name
 
         self._check(spec)
         return self.store.create_claimed_job(

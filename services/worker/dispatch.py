@@ -1,29 +1,147 @@
-"""Dispatch of requests to an engine: chunks submitted, answers collected, jobs sharing the slots"""
+"""Dispatch of requests: iterations cut into tasks, jobs that share the slots, and threads"""
 
 from __future__ import annotations
 
+import itertools
 import math
+import os
 import threading
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
 
-from gaitswarm.services.optimizer.errors import KilledWorker, ProvenanceChanged
+from gaitswarm.services.optimizer.errors import (
+    EvaluatorUnavailable,
+    KilledWorker,
+    ProvenanceChanged,
+)
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     EvaluationStopped,
     TaskReport,
 )
-from gaitswarm.services.worker.chunks import Chunk, Pace, cut
-from gaitswarm.services.worker.tasks import Answer
+from gaitswarm.services.worker.tasks import Answer, run_task
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Case, LongCase, WalkingCase
 from gaitswarm.sim.outcome import Outcome
+
+_TASKS_PER_SLOT: Final = 3
+"""Chunks of single cases per slot, so that all slots finish at about the same time."""
+
+_LONGEST_SECONDS: Final = 1.0
+"""Of a task on few slots; other jobs and a stop wait for so long."""
+
+_SECONDS_PER_SLOT: Final = 0.003
+"""Length of tasks on many slots, per slot: the evaluator spends about 1 ms on each of its tasks
+(docs/scale.md), and is to be idle for most of the time."""
+
+_OVERHEAD_SHARE: Final = 0.05
+"""Largest share of a task's time that sending it may take."""
+
+_UNMEASURED: Final = (10.0, 256.0)
+"""Smallest and largest cost of a job's first tasks [simulated s]."""
+
+_WEIGHT: Final = 0.5
+"""Of the last iteration in a pace, against all earlier ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """What one task simulates: designs `start` <= index < `stop` in some cases."""
+
+    cases: tuple[int, ...]
+    start: int
+    stop: int
+    cost: float  # simulated time that the kernel's lanes step through [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Speed of a job's tasks."""
+
+    seconds: float | None = None  # per simulated second of cost [s]; None before any is measured
+    overhead: float = 0.0  # time to send a task and its answer [s]
+
+    def after(self, times: Sequence[tuple[float, float, float]]) -> Pace:
+        """Return the pace after tasks of cost [simulated s], computing time and overhead [s]."""
+        cost = sum(cost for cost, _, _ in times)
+        if cost <= 0.0:
+            return self
+        seconds = sum(seconds for _, seconds, _ in times) / cost
+        # Other tasks may have waited for a free worker.
+        overhead = max(0.0, min(overhead for _, _, overhead in times))
+        if self.seconds is None:
+            return Pace(seconds, overhead)
+        return Pace(
+            (1.0 - _WEIGHT) * self.seconds + _WEIGHT * seconds,
+            (1.0 - _WEIGHT) * self.overhead + _WEIGHT * overhead,
+        )
+
+    def bounds(self, slots: int) -> tuple[float, float]:
+        """Return the smallest and largest cost of a task [simulated s]."""
+        if not self.seconds:
+            return _UNMEASURED
+        longest = max(_LONGEST_SECONDS, _SECONDS_PER_SLOT * slots) / self.seconds
+        return min(self.overhead / _OVERHEAD_SHARE / self.seconds, longest), longest
+
+
+def cut(
+    durations: Sequence[float],
+    designs: int,
+    *,
+    slots: int,
+    lanes: int,
+    pace: Pace | None = None,
+    together: bool = True,
+) -> tuple[Chunk, ...]:
+    """Cut an iteration into chunks, longest first, of one case that fill the kernel's lanes.
+
+    With fewer slots than cases a chunk has some designs in all cases, which the kernel packs into
+    its lanes without gaps. durations: of each case [s].
+    """
+    bounds = (pace or Pace()).bounds(slots)
+    if together and slots < len(durations):
+        # With one simulation per lane, the kernel cannot refill its lanes; with two, few are idle.
+        filled = lanes * max(durations)
+        longest = max(bounds[1], filled, min(2.0 * filled, _UNMEASURED[1]))
+        return _by_designs(durations, designs, slots, longest)
+    return _by_case(durations, designs, slots, lanes, bounds)
+
+
+def _by_designs(
+    durations: Sequence[float], designs: int, slots: int, longest: float
+) -> tuple[Chunk, ...]:
+    cases, duration = tuple(range(len(durations))), sum(durations)
+    pieces = slots * math.ceil(designs * duration / (slots * longest))
+    chunks = (Chunk(cases, a, b, (b - a) * duration) for a, b in _edges(designs, pieces))
+    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.start)))
+
+
+def _by_case(
+    durations: Sequence[float], designs: int, slots: int, lanes: int, bounds: tuple[float, float]
+) -> tuple[Chunk, ...]:
+    blocks = math.ceil(designs / lanes)
+    shortest, longest = bounds
+    even = sum(durations) * blocks * lanes / (_TASKS_PER_SLOT * slots)
+    target = min(max(even, shortest), longest)
+    chunks = [
+        Chunk((case,), a * lanes, min(b * lanes, designs), (b - a) * lanes * duration)
+        for case, duration in enumerate(durations)
+        for a, b in _edges(blocks, math.ceil(blocks / max(1, round(target / (duration * lanes)))))
+    ]
+    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.cases, chunk.start)))
+
+
+def _edges(count: int, pieces: int) -> list[tuple[int, int]]:
+    """Divide `count` into at most `pieces` equal ranges."""
+    edges = [count * piece // pieces for piece in range(pieces + 1)]
+    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
+
 
 T = TypeVar("T")
 
@@ -254,6 +372,21 @@ class Dispatcher:
         iteration.times.append((run.chunk.cost, answer.seconds, overhead))
 
 
+def in_daemon(name: str, call: Callable[..., T], *args: Any, **kwargs: Any) -> Future[T]:
+    """Call in a thread of its own, for which the end of the process does not wait."""
+    future = Future[T]()
+    future.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            future.set_result(call(*args, **kwargs))
+        except BaseException as error:  # noqa: BLE001 - raised where the result is awaited
+            future.set_exception(error)
+
+    threading.Thread(target=run, name=name, daemon=True).start()
+    return future
+
+
 def awaited(work: Future[T], should_stop: Callable[[], bool]) -> T:
     """Return the result of another thread's work, or raise EvaluationStopped."""
     while not wait([work], timeout=_GLANCE).done:
@@ -264,16 +397,88 @@ def awaited(work: Future[T], should_stop: Callable[[], bool]) -> T:
 
 def build_kernels(cases: Sequence[Case], should_stop: Callable[[], bool]) -> None:
     """Return when all robots' kernels are cached, for which workers would each wait."""
-    work: Future[None] = Future()
 
     def build() -> None:
-        try:
-            for robot, precision in {(r, case.precision) for case in cases for r in case.robots}:
-                simulate.prepare(robot, precision=precision)
-        except BaseException as error:  # noqa: BLE001 - raised again in `awaited`
-            work.set_exception(error)
-        else:
-            work.set_result(None)
+        for robot, precision in {(r, case.precision) for case in cases for r in case.robots}:
+            simulate.prepare(robot, precision=precision)
 
-    threading.Thread(target=build, name="kernel", daemon=True).start()
-    awaited(work, should_stop)
+    awaited(in_daemon("kernel", build), should_stop)
+
+
+_Task = tuple[Future[Answer], threading.Event]
+"""A task, and whether its answer is not needed any more."""
+
+
+def available_cpus() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class InProcessEvaluator:
+    """`Evaluator` on threads, by default on all processors, and the `Engine` of its tasks."""
+
+    def __init__(self, cpus: int | None = None) -> None:
+        self.slots = cpus if cpus is not None else available_cpus()
+        if self.slots < 1:
+            raise ValueError(f"cpus must be at least 1, it is {self.slots}")
+        self._dispatcher = Dispatcher()
+        self._pool = ThreadPoolExecutor(self.slots, thread_name_prefix="walks")
+        self._closed = threading.Event()
+
+    @property
+    def place(self) -> str:
+        return f"threads: {self.slots}"
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        return {"threads": self._dispatcher.load(self.slots)}
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        """Simulate in the threads, once the robots' kernels are built."""
+        build_kernels(request.cases, should_stop)
+        return self._dispatcher.evaluate(self, request, should_stop)
+
+    def close(self) -> None:
+        """End the threads after their present chunks. Idempotent."""
+        self._closed.set()
+        self._pool.shutdown()
+
+    def submit(self, request: EvaluationRequest, chunk: Chunk, /) -> _Task:
+        abandoned = threading.Event()
+
+        def in_vain() -> bool:
+            return abandoned.is_set() or self._closed.is_set()
+
+        def run() -> Answer:
+            self.check()
+            cases = [request.cases[case] for case in chunk.cases]
+            designs = request.designs[chunk.start : chunk.stop]
+            return run_task(cases, designs, request.provenance, in_vain)
+
+        try:
+            return self._pool.submit(run), abandoned
+        except RuntimeError:
+            # Closed meanwhile.
+            self.check()
+            raise
+
+    def wait(self, handles: Sequence[_Task], seconds: float) -> Sequence[_Task]:
+        futures = [future for future, _ in handles]
+        done = wait(futures, timeout=seconds, return_when=FIRST_COMPLETED).done
+        return [handle for handle in handles if handle[0] in done]
+
+    def answer(self, handle: _Task) -> Answer:
+        return handle[0].result()
+
+    def abandon(self, handles: Sequence[_Task]) -> None:
+        """Drop tasks that have not begun, and let the others end soon."""
+        for future, abandoned in handles:
+            abandoned.set()
+            future.cancel()
+
+    def check(self) -> None:
+        """Raise EvaluatorUnavailable once closed."""
+        if self._closed.is_set():
+            raise EvaluatorUnavailable("the evaluator was closed")

@@ -13,18 +13,18 @@ from typing import Any, Final
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from gaitswarm.services.worker.chunks import Chunk
 from gaitswarm.services.worker.dispatch import (
     MOST_KILLED,
+    Chunk,
     Dispatcher,
     Load,
     TaskLost,
     WorkerDied,
+    available_cpus,
     awaited,
     build_kernels,
     unlike,
 )
-from gaitswarm.services.worker.in_process import available_cpus
 from gaitswarm.services.worker.ray_session import RaySession, open_ray
 from gaitswarm.services.worker.tasks import (
     Answer,

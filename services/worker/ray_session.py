@@ -18,7 +18,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
-from gaitswarm.services.worker.in_process import available_cpus
+from gaitswarm.services.worker.dispatch import available_cpus
 from gaitswarm.services.worker.ray_node import OBJECT_STORE_BYTES, JoinedNode, comes_here
 
 _log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ import pytest
 
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from tests.examples.jobs import SMALL_SPEC
 
 

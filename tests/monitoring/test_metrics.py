@@ -15,8 +15,7 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
-from gaitswarm.services.worker.chunks import Chunk
-from gaitswarm.services.worker.dispatch import killed_workers
+from gaitswarm.services.worker.dispatch import Chunk, killed_workers
 from gaitswarm.sim.outcome import Status
 from tests.examples.processes import eventually
 from tests.examples.servers import Server

@@ -23,8 +23,8 @@ from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
+from gaitswarm.services.optimizer.run.runner import run_embedded
 from gaitswarm.services.optimizer.search.hype import pareto_ranks
 from gaitswarm.services.optimizer.search.optimizer import stored_state
 from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS, create_search

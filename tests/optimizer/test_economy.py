@@ -14,8 +14,12 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
-from gaitswarm.services.optimizer.run.journal import Journal, evaluate_uncached
+from gaitswarm.services.optimizer.run.execution import (
+    Journal,
+    RunContext,
+    evaluate_uncached,
+    run_claim,
+)
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history

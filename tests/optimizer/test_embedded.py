@@ -14,13 +14,13 @@ import pytest
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreReplaced
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState, Renewal
-from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     EvaluationStopped,
     Evaluator,
 )
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
+from gaitswarm.services.optimizer.run.runner import EMBEDDED_LEASE_SECONDS, run_embedded
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.outcome import Outcome

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, T
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.time_left import time_left
-from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.run.runner import run_embedded
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Status

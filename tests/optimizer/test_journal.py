@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import JournalEntry
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.journal import Journal
+from gaitswarm.services.optimizer.run.execution import Journal
 from gaitswarm.sim.outcome import Outcome
 from tests.optimizer.formula import HERE, FormulaEvaluator, job, walk
 

@@ -19,8 +19,8 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregate
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
-from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
+from gaitswarm.services.optimizer.run.runner import run_embedded
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from tests.calibration.conftest import spec as calibration

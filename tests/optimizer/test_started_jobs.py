@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.analysis.history import read_columns
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.run.runner import run_embedded
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.specs import chosen_spec

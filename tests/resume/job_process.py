@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.run import embedded
+from gaitswarm.services.optimizer.run import runner
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.kernel import Precision
@@ -30,7 +30,7 @@ LEASE: Final = 0.3
 def main(url: str, job_id: str, kind: str, connection: Connection) -> None:
     """Evaluate on `kind`; the state of the job's search is sent after every commit."""
     # The next process does not wait for long for the lease of one that was killed.
-    vars(embedded)["EMBEDDED_LEASE_SECONDS"] = 1.0
+    vars(runner)["EMBEDDED_LEASE_SECONDS"] = 1.0
     store = open_store(url)
     # On Ray from the first walk on, however short the job is.
     evaluator = RayEvaluator(cpus=2) if kind == "ray" else open_evaluator("in-process", cpus=2)

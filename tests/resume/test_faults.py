@@ -16,7 +16,7 @@ from benchmarks.faults.kinds import KINDS
 from benchmarks.faults.plan import plan
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.runtime import run_embedded
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from tests.store.postgres_server import server_binaries
 
 

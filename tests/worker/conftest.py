@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 

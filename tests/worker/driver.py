@@ -11,7 +11,7 @@ from contextlib import suppress
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.runtime import AutoEvaluator
 from gaitswarm.services.worker import ray_evaluator
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from tests.examples.processes import eventually
 from tests.worker.processes import descendants

@@ -13,7 +13,7 @@ import pytest
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
 from gaitswarm.services.runtime import AutoEvaluator, open_evaluator
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.services.worker.ray_session import RaySession
 from tests.examples.processes import eventually

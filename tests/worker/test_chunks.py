@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaitswarm.services.worker.chunks import Chunk, Pace, cut
+from gaitswarm.services.worker.dispatch import Chunk, Pace, cut
 from gaitswarm.services.worker.tasks import run_task
 from gaitswarm.sim.kernel.walk import LaneUse
 from gaitswarm.sim.scenario import SCENARIOS

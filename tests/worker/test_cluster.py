@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import run_embedded
 from gaitswarm.services.worker import ray_node
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.sim.case import Walk
 from tests.examples.jobs import LONG_SPEC, history
 from tests.examples.paths import ROOT, copy_package

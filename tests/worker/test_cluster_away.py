@@ -16,7 +16,7 @@ import pytest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.runtime import run_embedded
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
 from tests.examples.processes import eventually, line_with

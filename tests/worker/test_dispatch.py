@@ -17,8 +17,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationStopped,
     TaskReport,
 )
-from gaitswarm.services.worker.chunks import Chunk
-from gaitswarm.services.worker.dispatch import Dispatcher, TaskLost, WorkerDied
+from gaitswarm.services.worker.dispatch import Chunk, Dispatcher, TaskLost, WorkerDied
 from gaitswarm.services.worker.tasks import Answer, run_task
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status

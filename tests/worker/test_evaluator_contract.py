@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError

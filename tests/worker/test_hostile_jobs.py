@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.kernel import derivation
 from gaitswarm.sim.robot import RobotFiles

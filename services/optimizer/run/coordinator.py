@@ -174,14 +174,9 @@ Action = Record | Begin | Evaluate | Commit | Wait | Release
 def iteration_of(action: Action) -> int | None:
     """Return the iteration that an action concerns."""
     match action:
-        case Begin(ask=ask):
-            return ask.iteration
-        case Evaluate(request=request):
-            return request.iteration
-        case Commit(done=done):
-            return done.iteration
-        case _:
-            return None
+        case Begin(part) | Evaluate(part) | Commit(part):
+            return part.iteration
+    return None
 
 
 KEY_BYTES: Final = 16
@@ -267,11 +262,8 @@ def handle(state: Coordination, event: Event) -> Decision:  # noqa: C901, PLR091
         case Phase.COMMITTING, Extended(job=job):
             return _commit(replace(state, job=job), _done(state))
         case phase, _:
-            raise ValueError(f"unexpected {name_of(event)} while {phase}")
-
-
-def name_of(event: Event) -> str:
-    return str(event) if isinstance(event, Signal) else type(event).__name__
+            name = event if isinstance(event, Signal) else type(event).__name__
+            raise ValueError(f"unexpected {name} while {phase}")
 
 
 def _start(state: Coordination, event: Claimed) -> Decision:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,9 @@ class Evaluator(Protocol):
 
     Results depend on the request alone, bit for bit; not on place, order, chunks or retries of
     simulations. Arrays are neither kept nor modified.
+
+    It may have two more members, which answer at once: `place`, where it last evaluated, such as
+    "threads: 2"; and `trouble()`, why designs cannot be evaluated now, None if they can.
     """
 
     @property
@@ -83,32 +86,6 @@ class Evaluator(Protocol):
 
     def close(self) -> None:
         """Release all resources. Idempotent."""
-
-
-@runtime_checkable
-class Watched(Protocol):
-    """An evaluator that reports its health."""
-
-    def trouble(self) -> str | None:
-        """Return why designs cannot be evaluated now; None if they can. Returns at once."""
-
-
-@runtime_checkable
-class Located(Protocol):
-    """An evaluator that reports where it simulates."""
-
-    @property
-    def place(self) -> str | None:
-        """Place of the last evaluation, such as "threads: 2"; None if unknown. Returns at once."""
-
-
-def place_of(evaluator: object) -> str | None:
-    """Return where an evaluator simulates; None if unknown.
-
-    Args:
-        evaluator: any `Evaluator`.
-    """
-    return evaluator.place if isinstance(evaluator, Located) else None
 
 
 class EvaluationStopped(Exception):

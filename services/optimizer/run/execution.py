@@ -1,14 +1,18 @@
-"""Execution of one claimed job: a shell around the coordinator, and renewal of its lease"""
+"""Execution of one claimed job: a shell around the coordinator, its journal and its lease"""
 
 from __future__ import annotations
 
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import (
     BudgetChanged,
@@ -20,7 +24,7 @@ from gaitswarm.services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, JournalEntry
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -46,19 +50,181 @@ from gaitswarm.services.optimizer.run.coordinator import (
     Wait,
     handle,
     iteration_of,
-    name_of,
 )
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     EvaluationStopped,
     Evaluator,
-    place_of,
 )
-from gaitswarm.services.optimizer.run.journal import JOURNAL_SECONDS, Journal, evaluate_uncached
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
+from gaitswarm.sim.outcome import Outcome, Status
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
+
+JOURNAL_SECONDS: Final = 10.0
+"""Iterations that take longer, as the previous one did or as this one does, are journaled [s]."""
+
+_log = logging.getLogger(__name__)
+
+
+def evaluate_uncached(
+    journal: Journal,
+    store: Store | None,
+    request: EvaluationRequest,
+    keys: Sequence[bytes],
+    should_stop: Callable[[], bool],
+) -> tuple[tuple[Outcome, ...], tuple[bytes | None, ...]]:
+    """Evaluate a request without its cached and duplicate designs."""
+    if store is None or not keys:
+        return journal.evaluate(request, keys, should_stop), tuple(keys)
+    first = {key: index for index, key in reversed(list(enumerate(keys)))}
+    cached = _cached(store, request, tuple(first))
+    chosen = sorted(first.values())
+    part = replace(request, designs=request.designs[chosen])
+    found = journal.evaluate(part, [keys[index] for index in chosen], should_stop, cached)
+    place = {keys[index]: row for row, index in enumerate(chosen)}
+    rows = [place[key] for key in keys]
+    outcomes = tuple(Outcome(each.objectives[rows], each.statuses[rows]) for each in found)
+    new = [key not in cached and first[key] == index for index, key in enumerate(keys)]
+    return outcomes, tuple(key if is_new else None for key, is_new in zip(keys, new, strict=True))
+
+
+def _cached(
+    store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]
+) -> dict[bytes, Outcome]:
+    try:
+        stored = store.known(keys)
+    except StoreUnavailable as error:
+        _log.warning("job %s: simulating all designs without the cache: %s", request.job_id, error)
+        return {}
+    shapes = {(len(request.cases), len(case.objectives)) for case in request.cases}
+    return {
+        key: outcome
+        for key, outcome in stored.items()
+        # Infinities are stored as NaN.
+        if outcome.objectives.shape in shapes
+        and np.isfinite(outcome.objectives[outcome.statuses == Status.OK]).all()
+    }
+
+
+class Journal:
+    """Evaluates the requests of a claimed job, without what an earlier run of it has stored."""
+
+    def __init__(
+        self,
+        claim: Claim,
+        store: Store,
+        evaluator: Evaluator,
+        *,
+        after_seconds: float = JOURNAL_SECONDS,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._claim = claim
+        self._store = store
+        self._evaluator = evaluator
+        self._after_seconds = after_seconds
+        self._clock = clock
+        self._known: dict[tuple[int, bytes], tuple[NDArray[np.float64], int]] = {}
+        for entry in claim.journal:
+            self._know(entry)
+        self._finished: list[JournalEntry] = []
+        self._is_stored = bool(claim.journal)
+        self._begun: float | None = None
+        self._was_long = False
+        self._writing = threading.Lock()
+
+    def evaluate(
+        self,
+        request: EvaluationRequest,
+        keys: Sequence[bytes],
+        should_stop: Callable[[], bool],
+        cached: Mapping[bytes, Outcome] = MappingProxyType({}),
+    ) -> tuple[Outcome, ...]:
+        """Evaluate as `Evaluator.evaluate`; designs are identified by their keys."""
+        if not keys:
+            return self._evaluator.evaluate(request, should_stop)
+        if self._begun is None:
+            self._begun = self._clock()
+        numbers, count = range(len(request.cases)), len(keys)
+        known = self._known | {
+            (number, key): (outcome.objectives[number], int(outcome.statuses[number]))
+            for key, outcome in cached.items()
+            for number in numbers
+        }
+        if not known:
+            return self._run(request, numbers, keys, should_stop)
+        missing = np.array([[(number, key) not in known for number in numbers] for key in keys])
+        outcomes = [
+            Outcome(np.empty((count, len(case.objectives))), np.empty(count, dtype=np.uint8))
+            for case in request.cases
+        ]
+        for row, number in np.argwhere(~missing).tolist():
+            outcome = outcomes[number]
+            outcome.objectives[row], outcome.statuses[row] = known[number, keys[row]]
+        # Designs that are missing in the same cases make up a request.
+        for pattern in np.unique(missing[missing.any(axis=1)], axis=0):
+            rows = np.flatnonzero((missing == pattern).all(axis=1)).tolist()
+            cases = np.flatnonzero(pattern).tolist()
+            part = replace(
+                request,
+                cases=tuple(request.cases[number] for number in cases),
+                designs=request.designs[rows],
+            )
+            evaluated = self._run(part, cases, [keys[row] for row in rows], should_stop)
+            for number, outcome in zip(cases, evaluated, strict=True):
+                outcomes[number].objectives[rows] = outcome.objectives
+                outcomes[number].statuses[rows] = outcome.statuses
+        return tuple(outcomes)
+
+    def _run(
+        self,
+        request: EvaluationRequest,
+        cases: Sequence[int],
+        keys: Sequence[bytes],
+        should_stop: Callable[[], bool],
+    ) -> tuple[Outcome, ...]:
+        def on_outcome(case: int, first: int, outcome: Outcome) -> None:
+            of_designs = tuple(keys[first : first + len(outcome.statuses)])
+            self._finished.append(JournalEntry(cases[case], of_designs, outcome))
+
+        return self._evaluator.evaluate(replace(request, on_outcome=on_outcome), should_stop)
+
+    def store_finished(self) -> None:
+        """Store what tasks have finished, if the iteration is a long one. Thread-safe."""
+        with self._writing:
+            begun, count = self._begun, len(self._finished)
+            if begun is None or not count:
+                return
+            if self._was_long or self._clock() - begun > self._after_seconds:
+                entries = self._finished[:count]
+                self._is_stored = True
+                self._store.journal(self._claim, entries)
+                del self._finished[:count]
+                for entry in entries:
+                    self._know(entry)
+
+    def close(self) -> bool:
+        """Store nothing more of the iteration; return whether any of it is stored."""
+        with self._writing:
+            if self._begun is not None:
+                self._was_long = self._clock() - self._begun > self._after_seconds
+                self._begun = None
+            return self._is_stored
+
+    def clear(self) -> None:
+        """Forget the iteration, which was committed."""
+        self._known.clear()
+        self._finished.clear()
+        self._is_stored = False
+
+    def _know(self, entry: JournalEntry) -> None:
+        rows = zip(
+            entry.keys, entry.outcome.objectives, entry.outcome.statuses.tolist(), strict=True
+        )
+        for key, objectives, status in rows:
+            self._known[entry.case, key] = objectives, status
+
 
 _BEATS_PER_LEASE: Final = 3
 _LONGEST_INTERVAL: Final = 1.0
@@ -91,9 +257,9 @@ class Heartbeat:
         self._lost = threading.Event()
         # As of the last beat.
         self.state, self.priority = claim.job.state, claim.job.priority
-        self._thread = threading.Thread(
-            target=self._beat_of_job, name=f"heartbeat-{claim.job.id}", daemon=True
-        )
+        beat = log_context(job=claim.job.id)(self._beat)
+        name = f"heartbeat-{claim.job.id}"
+        self._thread = threading.Thread(target=beat, name=name, daemon=True)
 
     @property
     def lost(self) -> bool:
@@ -107,10 +273,6 @@ class Heartbeat:
     def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
-
-    def _beat_of_job(self) -> None:
-        with log_context(job=self._claim.job.id):
-            self._beat()
 
     def _beat(self) -> None:
         failed = False
@@ -187,7 +349,7 @@ def run_claim(
         with log_context(job=claim.job.id), run.heartbeat:
             state, actions = run.begin()
             while actions:
-                state, actions = run.decide(state, run.execute(actions))
+                state, actions = run.proceed(state, actions)
     except StoreUnavailable:
         raise
     except BaseException:
@@ -195,12 +357,6 @@ def run_claim(
             context.store.release(claim, JobState.QUEUED)
         raise
     return context.store.job(claim.job.id)
-
-
-def _fail(state: Coordination, error: Exception, what: str) -> Decision:
-    _log.exception(what)
-    failed = Release(JobState.FAILED, f"internal error: {type(error).__name__}: {error}")
-    return replace(state, phase=Phase.ENDED), (failed,)
 
 
 class _Run:
@@ -230,25 +386,31 @@ class _Run:
 
     def begin(self) -> Decision:
         """Decide on the first actions; a job whose robot cannot be read fails."""
-        state = Coordination(backoff=self.context.backoff)
+        state, context = Coordination(backoff=self.context.backoff), self.context
+
+        def claimed() -> Decision:
+            provenance = context.provenance(self.claim.job.spec)
+            return handle(state, Claimed(self.claim, provenance, context.accepts_changes))
+
+        return self._decided(state, claimed)
+
+    def proceed(self, state: Coordination, actions: tuple[Action, ...]) -> Decision:
+        """Execute actions and decide on the next ones."""
+        event = self._execute(actions)
+        return self._decided(state, lambda: handle(state, event))
+
+    def _decided(self, state: Coordination, decide: Callable[[], Decision]) -> Decision:
+        """Decide, but fail a job that raises, as it would be claimed again and again."""
         try:
-            here = self._computed(lambda: self.context.provenance(self.claim.job.spec))
+            return self._computed(decide)
         except EvaluationStopped:
             return handle(state, self._stopped())
         except Exception as error:  # noqa: BLE001
-            return _fail(state, error, f"job {self.claim.job.id}: cannot determine its provenance")
-        return self.decide(state, Claimed(self.claim, here, self.context.accepts_changes))
+            _log.exception("job %s cannot continue", self.claim.job.id)
+            failed = Release(JobState.FAILED, f"internal error: {type(error).__name__}: {error}")
+            return replace(state, phase=Phase.ENDED), (failed,)
 
-    def decide(self, state: Coordination, event: Event) -> Decision:
-        """As `handle`, but fail a job that raises, as it would be claimed again and again."""
-        try:
-            return self._computed(lambda: handle(state, event))
-        except EvaluationStopped:
-            return handle(state, self._stopped())
-        except Exception as error:  # noqa: BLE001
-            return _fail(state, error, f"a job cannot continue after {name_of(event)}")
-
-    def execute(self, actions: tuple[Action, ...]) -> Event:
+    def _execute(self, actions: tuple[Action, ...]) -> Event:
         """Execute actions in order; return the event that answers the last, or an interruption."""
         answer: Event | None = None
         try:
@@ -284,7 +446,8 @@ class _Run:
             case Evaluate(request=request, keys=keys):
                 return self._evaluate(request, keys)
             case Commit(done=done, following=following):
-                done = replace(done, evaluated_on=place_of(self.context.evaluator))
+                place = getattr(self.context.evaluator, "place", None)
+                done = replace(done, evaluated_on=place)
                 journaled, commit = self.journal.close(), self.context.store.commit
                 state = self._stored(
                     lambda: commit(self.claim, done, following, journaled=journaled)

@@ -21,7 +21,7 @@ from benchmarks.large_store import fill
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.services.optimizer.analysis.distribution import distribution
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
-from gaitswarm.services.optimizer.analysis.ranking import rank
+from gaitswarm.services.optimizer.analysis.preferences import rank
 from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder

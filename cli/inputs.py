@@ -81,7 +81,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
 
 def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
     """Return the spec with another search method or preset, with default settings."""
-    from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
+    from gaitswarm.services.optimizer.jobs.spec import with_settings
     from gaitswarm.specs import job_spec
 
     document = spec.model_dump(mode="json")
@@ -92,7 +92,7 @@ def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
 
 def check_optimizer_name(name: str, option: str) -> None:
     """Raise InvalidRequest for the option if no search method has the name."""
-    from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_settings
+    from gaitswarm.services.optimizer.jobs.spec import optimizer_settings
 
     try:
         optimizer_settings(name)
@@ -147,7 +147,7 @@ def _set_start(fields: dict[str, Any], data: Mapping[str, Any]) -> None:
 
 def _merge_settings(fields: dict[str, Any], optimizer: object) -> None:
     """Merge settings and particles into `optimizer`, by default that of the file."""
-    from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
+    from gaitswarm.services.optimizer.jobs.spec import with_settings
 
     text, particles = fields.pop("optimizer_settings", None), fields.pop("particles", None)
     settings = {} if text is None else json_object(text, "optimizer-settings")

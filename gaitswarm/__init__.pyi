@@ -6,18 +6,19 @@ from gaitswarm.jobs.database import DatabaseJobs, Interrupted
 from gaitswarm.jobs.open import connect, open  # noqa: A004
 from gaitswarm.jobs.server import ServerJobs
 from gaitswarm.optimization import JobEnded, OptimizationResult, optimize
-from gaitswarm.services.optimizer.analysis.candidate_preferences import CandidatePreferencesView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
 from gaitswarm.services.optimizer.analysis.front import FrontView
-from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView, TargetsView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
-from gaitswarm.services.optimizer.analysis.preferences import PreferenceForView
-from gaitswarm.services.optimizer.analysis.ranking import RankingView
+from gaitswarm.services.optimizer.analysis.preferences import (
+    CandidatePreferencesView,
+    PreferenceForView,
+    RankingView,
+)
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
 from gaitswarm.services.optimizer.analysis.surface import SurfaceView
-from gaitswarm.services.optimizer.analysis.targets import TargetsView
 from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
@@ -36,9 +37,8 @@ from gaitswarm.services.optimizer.errors import (
     Unavailable,
     Unreadable,
 )
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec, IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds

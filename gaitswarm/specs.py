@@ -16,9 +16,8 @@ from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
 from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceName
-from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
+from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec, with_settings
 from gaitswarm.services.optimizer.search.registry import OptimizerName, OptimizerSettings
 from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName

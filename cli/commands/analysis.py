@@ -26,8 +26,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.services.optimizer.analysis.candidate_preferences import CandidatePreferencesView
-    from gaitswarm.services.optimizer.analysis.failures import FailuresView
+    from gaitswarm.services.optimizer.analysis.distribution import FailuresView
     from gaitswarm.services.optimizer.analysis.front import (
         FrontView,
         FrontWinnerView,
@@ -39,10 +38,11 @@ if TYPE_CHECKING:
         VariableImportanceView,
     )
     from gaitswarm.services.optimizer.analysis.preferences import (
+        CandidatePreferencesView,
         PreferenceFitView,
         PreferenceForView,
+        RankingView,
     )
-    from gaitswarm.services.optimizer.analysis.ranking import RankingView
 
 
 def rank(

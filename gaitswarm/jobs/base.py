@@ -690,7 +690,7 @@ class Jobs(ABC):
             scenario_aggregate: `mean` or `worst`; None: that of the job.
             top: How many of the best designs to list, 1 to 1000.
         """
-        from gaitswarm.services.optimizer.analysis.ranking import rank
+        from gaitswarm.services.optimizer.analysis.preferences import rank
         from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 
         job = self._service.job(job_id)
@@ -727,7 +727,7 @@ class Jobs(ABC):
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> types.FailuresView:
         """Count the failed designs of a job by case and status, from stored statuses."""
-        from gaitswarm.services.optimizer.analysis.failures import failures
+        from gaitswarm.services.optimizer.analysis.distribution import failures
 
         job = self._service.job(job_id)
         return failures(self._service.columns(job), job.spec.case_names)
@@ -899,8 +899,10 @@ class Jobs(ABC):
         Raises:
             Conflict: One of them has no feasible design yet.
         """
-        from gaitswarm.services.optimizer.analysis.identifiability import check_comparable
-        from gaitswarm.services.optimizer.analysis.targets import target_results
+        from gaitswarm.services.optimizer.analysis.identifiability import (
+            check_comparable,
+            target_results,
+        )
         from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
         jobs = [self._service.job(job_id) for job_id in job_ids]
@@ -964,7 +966,7 @@ class Jobs(ABC):
         Raises:
             Conflict: None of them has a feasible optimum yet.
         """
-        from gaitswarm.services.optimizer.analysis.candidate_preferences import (
+        from gaitswarm.services.optimizer.analysis.preferences import (
             candidate_preferences,
         )
         from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec

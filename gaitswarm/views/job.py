@@ -8,12 +8,12 @@ from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
+from gaitswarm.services.optimizer.analysis.bounds import ClosestView
 from gaitswarm.services.optimizer.analysis.evaluations import (
     EvaluationView,
     ObjectiveView,
     evaluation_views,
 )
-from gaitswarm.services.optimizer.analysis.feasibility import ClosestView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import Lineage

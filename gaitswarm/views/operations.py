@@ -15,7 +15,7 @@ from gaitswarm.services.monitoring.activity import (
     TaskSpanView,
     WorkerHealthView,
 )
-from gaitswarm.services.optimizer.jobs.audit import AuditAction
+from gaitswarm.services.optimizer.jobs.listing import AuditAction
 from gaitswarm.services.optimizer.jobs.notification import Notification
 from gaitswarm.services.optimizer.views import JobName, View
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 import numpy as np
 
-from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, closest
+from gaitswarm.services.optimizer.analysis.bounds import ClosestView, closest
 from gaitswarm.services.optimizer.analysis.fork import (
     Parent,
     check_begun,
@@ -18,7 +18,6 @@ from gaitswarm.services.optimizer.analysis.fork import (
 )
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.errors import ProvenanceChanged, within
-from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import checked_spec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
@@ -33,6 +32,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import other_measure
+from gaitswarm.services.optimizer.jobs.listing import LOCAL
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 

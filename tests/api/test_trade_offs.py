@@ -8,7 +8,7 @@ import httpx2
 import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.calibration import IdentificationSpec
 from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import Commit
 

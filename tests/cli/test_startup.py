@@ -36,7 +36,7 @@ RARE = (
     "sqlalchemy.dialects.postgresql",
     *(
         f"gaitswarm.services.optimizer.jobs.kinds.{other}"
-        for other in ("calibration", "certificate", "identification", "preferences")
+        for other in ("calibration", "certificate", "preferences")
     ),
 )  # fmt: skip
 

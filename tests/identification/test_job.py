@@ -11,7 +11,7 @@ from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.services.optimizer.analysis.identifiability import Trust
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.calibration import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.preference import Judgement
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService

@@ -13,19 +13,21 @@ from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec, root_mean_square
+from gaitswarm.services.optimizer.jobs.kinds.calibration import (
+    CalibrationSpec,
+    IdentificationSpec,
+    root_mean_square,
+)
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_settings
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.jobs.provenance import (
     JobProvenance,
     job_provenance,
     optimizer_files,
 )
-from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec
+from gaitswarm.services.optimizer.jobs.spec import EarlierJobs, Spec, optimizer_settings
 from gaitswarm.services.optimizer.run.coordinator import (
     Begin,
     Claimed,

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaitswarm.services.optimizer.analysis.ranking import RankingView, rank
-from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
+from gaitswarm.services.optimizer.analysis.preferences import RankingView, rank
+from gaitswarm.services.optimizer.analysis.utilities import fitness_by, log_utilities, utilities
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, judge
@@ -51,15 +51,15 @@ def test_it_agrees_with_the_jobs_own_arithmetic(
     fast = log_utilities(columns, weights)
 
     np.testing.assert_allclose(fast, exact.log_utilities, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(fitness_of(fast), exact.fitness, rtol=1e-12)
+    np.testing.assert_allclose(fitness_by(columns, weights), exact.fitness, rtol=1e-12)
 
 
 def test_more_rows_than_a_block_are_all_judged() -> None:
     objectives = np.random.default_rng(1).uniform(0.1, 50.0, (9001, 3, 6))
     columns = columns_of(objectives)
     exact = judge(objectives, columns.failed, PREFERENCES["B"])
-    fast = log_utilities(columns, PREFERENCES["B"])
-    np.testing.assert_allclose(fitness_of(fast), exact.fitness, rtol=1e-12)
+    fast = fitness_by(columns, PREFERENCES["B"])
+    np.testing.assert_allclose(fast, exact.fitness, rtol=1e-12)
 
 
 def test_utilities_are_by_the_jobs_own_preference() -> None:

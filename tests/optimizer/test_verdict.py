@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaitswarm.services.optimizer.analysis.bounds import WidenedView
-from gaitswarm.services.optimizer.analysis.feasibility import LimitView
+from gaitswarm.services.optimizer.analysis.bounds import LimitView, WidenedView
 from gaitswarm.services.optimizer.analysis.verdict import (
     QUANTITIES,
     QuantityView,

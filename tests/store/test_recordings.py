@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.calibration import IdentificationSpec
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.identification import RecordedWalk

@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.errors import (
     Unreadable,
 )
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
-from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.calibration import IdentificationSpec
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.optimizer.store.engine import Database

@@ -11,16 +11,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
-from gaitswarm.services.optimizer.analysis.utilities import (
-    NAMED,
-    NORMALISED_NAMES,
-    NORMALISED_OBJECTIVES,
-    PreferenceOwner,
-    fitness_by,
-)
+from gaitswarm.services.optimizer.analysis.utilities import NAMED, PreferenceOwner, fitness_by
 from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import WEIGHED, WEIGHED_NAMES
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import (
     DesignValues,
@@ -291,7 +286,7 @@ def pareto_front(
     marks: dict[int, list[str]] = {}
     for number, (row, _) in enumerate(knees, start=1):
         marks.setdefault(row, []).append(f"knee {number}")
-    for name, row in zip(NORMALISED_NAMES, extremes.tolist(), strict=True):
+    for name, row in zip(WEIGHED_NAMES, extremes.tolist(), strict=True):
         marks.setdefault(row, []).append(f"least {name}")
     for name, row in winners.items():
         label = "best of the job" if name == "job" else f"best under {name}"
@@ -305,7 +300,7 @@ def pareto_front(
 
     judged = int(np.isfinite(vectors[:, 0]).sum())
     return FrontView(
-        objectives=[ObjectiveView.model_validate(f) for f in NORMALISED_OBJECTIVES],
+        objectives=[ObjectiveView.model_validate(f) for f in WEIGHED],
         designs_judged=judged,
         failed=len(columns) - judged - infeasible,
         infeasible=infeasible,
@@ -322,7 +317,7 @@ def pareto_front(
         knees=[KneeView(**fields(row), distance=distance) for row, distance in knees],
         extremes=[
             ExtremeView(**fields(row), objective=name)
-            for name, row in zip(NORMALISED_NAMES, extremes.tolist(), strict=True)
+            for name, row in zip(WEIGHED_NAMES, extremes.tolist(), strict=True)
         ],
         winners=[
             FrontWinnerView(**fields(row), preference=name, **_dominance(vectors, rows, row))
@@ -349,7 +344,7 @@ def design_fields(
 
 
 def by_objective(values: Floats) -> dict[str, float]:
-    return dict(zip(NORMALISED_NAMES, values.tolist(), strict=True))
+    return dict(zip(WEIGHED_NAMES, values.tolist(), strict=True))
 
 
 def front_knees(normalised: Floats, rows: Rows, extremes: Rows) -> list[tuple[int, float]]:

@@ -15,16 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.bounds import End, WidenedView, bound_at, wider_bounds
-from gaitswarm.services.optimizer.analysis.distribution import thinned
-from gaitswarm.services.optimizer.analysis.statistics import (
+from gaitswarm.services.optimizer.analysis.bounds import (
+    End,
+    WidenedView,
+    bound_at,
+    with_wider_bounds,
+)
+from gaitswarm.services.optimizer.analysis.distribution import (
     CONFIDENCE,
     average_ranks,
     resample_weights,
+    thinned,
 )
-from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, objective_vectors
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import WEIGHED_NAMES
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import View
@@ -121,7 +127,7 @@ def importance(spec: Spec, columns: EvaluationColumns, best: Evaluation | None) 
         designs=succeeded,
         failed=len(columns) - succeeded,
         sampled=len(sampled),
-        objectives=list(NORMALISED_NAMES) if isinstance(spec, JobSpec) else [],
+        objectives=list(WEIGHED_NAMES) if isinstance(spec, JobSpec) else [],
         iteration=None if best is None else best.iteration,
         particle=None if best is None else best.particle,
         variables=list(_variables(spec, sampled, None if best is None else best.design)),
@@ -145,7 +151,7 @@ def _variables(
     if isinstance(spec, JobSpec):
         vectors = objective_vectors(columns, aggregation=spec.aggregation)
         complete = succeeded & np.isfinite(vectors).all(axis=1)
-        for column, name in enumerate(NORMALISED_NAMES):
+        for column, name in enumerate(WEIGHED_NAMES):
             objectives[name] = indices(vectors[:, column], complete)
     moved = companions(designs, variables)
     for k, variable in enumerate(variables):
@@ -164,7 +170,7 @@ def _variables(
             correlation=correlation,
             winner=value,
             at=at,
-            widened=None if at is None else wider_bounds(spec, variable, at),
+            widened=None if at is None else with_wider_bounds(spec, variable, at)[1],
         )
 
 

@@ -1,4 +1,4 @@
-"""Preferences under which a chosen design wins
+"""Preferences: rankings by another one, those under which a design wins, and candidates
 
 For given biases the logarithm of fitness is linear in the exponents (eq. 4.1, 4.2), so the
 exponents under which a design has the greatest lead solve a linear program.
@@ -6,29 +6,160 @@ exponents under which a design has the greatest lead solve a linear program.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from dataclasses import replace
+from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.front import TradeOffDesignView, design_fields
+from gaitswarm.services.optimizer.analysis.distribution import iteration_starts, spearman
+from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
+from gaitswarm.services.optimizer.analysis.front import Rows, TradeOffDesignView, design_fields
 from gaitswarm.services.optimizer.analysis.utilities import (
     NAMED,
     PreferenceOwner,
     fitness_by,
+    infeasible_rows,
     objective_vectors,
 )
-from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
+from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.jobs.constraints import Constraints
+from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns, evaluations_of
+from gaitswarm.services.optimizer.jobs.kinds.preferences import (
+    CRITERIA,
+    FIGURES,
+    PreferencesSpec,
+    preference_of,
+)
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
-from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
+    ScenarioAggregate,
+    ScenarioWeights,
+)
+from gaitswarm.services.optimizer.jobs.labels import OWN, preference_name
+from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceChoice
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.views import Finite, View
+from gaitswarm.services.optimizer.views import (
+    DesignValues,
+    Finite,
+    IterationIndex,
+    JobName,
+    Particle,
+    Request,
+    View,
+)
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
 
-Rows = NDArray[np.intp]
+
+class RankingRequest(Request):
+    """Preference and constraints by which to rank the designs of a job."""
+
+    preference: PreferenceChoice | None = Field(
+        default=None,
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own; null: as by the job.",
+        examples=["B"],
+    )
+    constraints: Constraints | None = Field(
+        default=None,
+        description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
+        " list: none.",
+        examples=[["speed>=0.05"]],
+    )
+    scenario_weights: ScenarioWeights | None = Field(
+        default=None, description="As in a spec; null: those of the job."
+    )
+    scenario_aggregate: ScenarioAggregate | None = Field(
+        default=None, description="As in a spec; null: that of the job."
+    )
+    top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
+
+
+class RankedDesignView(EvaluationView):
+    """A design and its ranks; among equals the earliest comes first."""
+
+    fitness: float = Field(description="Under the requested preference [1].", examples=[20.8])
+    rank: int = Field(description="Rank under the requested preference, from 1.")
+    rank_before: int | None = Field(
+        description="Rank under the job's own preference, from 1; null if it has none."
+    )
+    fitness_before: Finite = Field(description="By the job's own preference [1].")
+
+
+class BestSoFarView(View):
+    """Best fitness so far under the requested preference."""
+
+    index: IterationIndex
+    fitness: Finite = Field(description="Least fitness of this and all earlier iterations [1].")
+
+
+class RankingView(View):
+    """A job's designs ranked by another preference, without simulation."""
+
+    preference: PreferenceChoice = Field(description="The requested preference.")
+    evaluations: int = Field(description="Designs that were ranked.")
+    infeasible: int = Field(
+        description="Designs that did not fail and violate the requested constraints."
+    )
+    fitness_of_present_best: Finite = Field(
+        description="By the requested preference, of the job's own best design [1].",
+        examples=[23.1],
+    )
+    correlation: Finite = Field(
+        description="Spearman's rank correlation of both rankings, over the designs in"
+        " both [1]; null where it is undefined.",
+        examples=[0.83],
+    )
+    top: list[RankedDesignView] = Field(description="The best designs, best first.")
+    best_so_far: list[BestSoFarView] = Field(description="One entry an iteration, in order.")
+
+
+def rank(columns: EvaluationColumns, spec: JobSpec, *, top: int) -> RankingView:
+    """Rank all designs by their stored results."""
+    preference, before = spec.resolved_preference(), columns.fitness
+    fitness = fitness_by(columns, preference, aggregation=spec.aggregation)
+    walked = np.isfinite(fitness)
+    fitness[infeasible_rows(columns, spec)] = np.inf
+    present = _best_first(before)
+    ranks = np.zeros(len(columns), dtype=np.int64)
+    ranks[present] = np.arange(1, len(present) + 1)
+    rows = _best_first(fitness)[:top]
+    views = evaluation_views(evaluations_of(replace(columns, fitness=fitness).rows(rows)), spec)
+    starts = iteration_starts(columns)
+    least = np.minimum.reduceat(fitness, starts) if len(starts) else fitness
+    best_so_far = np.minimum.accumulate(least).tolist()
+    both = np.isfinite(fitness) & np.isfinite(before)
+    correlation = spearman(fitness[both], before[both]) if both.any() else None
+    # One validation for all: a call for each iteration would dominate.
+    return RankingView.model_validate(
+        {
+            "preference": spec.preference,
+            "evaluations": len(columns),
+            "infeasible": int(np.count_nonzero(walked & np.isinf(fitness))),
+            "fitness_of_present_best": float(fitness[present[0]]) if len(present) else None,
+            "correlation": correlation,
+            "top": [
+                {
+                    **dict(view),
+                    "rank": place,
+                    "rank_before": int(ranks[row]) or None,
+                    "fitness_before": before[row],
+                }
+                for place, (row, view) in enumerate(zip(rows.tolist(), views, strict=True), start=1)
+            ],
+            "best_so_far": [
+                {"index": index, "fitness": value} for index, value in enumerate(best_so_far)
+            ],
+        }
+    )
+
+
+def _best_first(fitness: Floats) -> Rows:
+    """Rows of finite fitness, best first; ties by age."""
+    order = np.argsort(fitness, kind="stable")
+    return order[np.isfinite(fitness[order])]
+
 
 _DRAWN: Final = 512
 """Sampled exponents for a design that cannot win."""
@@ -108,59 +239,39 @@ def preference_for(columns: EvaluationColumns, row: int, spec: JobSpec) -> Prefe
         vectors = objective_vectors(columns, bias, aggregation=spec.aggregation)
         others = np.flatnonzero((vectors != vectors[row]).any(axis=1))
         exponent = _exponents(vectors, row, others)
-        exact, rounded = (
-            _fit(columns, row, others, Preference(bias=bias, exponent=tuple(e)), spec.aggregation)
-            for e in (exponent.tolist(), np.round(exponent, _DECIMALS).tolist())
+        candidates = []
+        for exponents in (np.round(exponent, _DECIMALS).tolist(), exponent.tolist()):
+            preference = Preference(bias=bias, exponent=tuple(exponents))
+            fitness = fitness_by(columns, preference, aggregation=spec.aggregation)
+            rank = int(np.count_nonzero(fitness[others] < fitness[row])) + 1
+            candidates.append((rank, preference, fitness))
+        rank, preference, fitness = min(candidates, key=lambda candidate: candidate[0])
+        # The best of the rows that are not equal to the design.
+        rival = int(others[fitness[others].argmin()]) if len(others) else row
+        margin = None
+        if rival != row and np.isfinite(fitness[rival]):
+            with np.errstate(all="ignore"):
+                ratio = float((fitness[rival] / fitness[row]) ** (1.0 / sum(preference.exponent)))
+            margin = ratio - 1.0
+        fit = PreferenceFitView(
+            preference=preference,
+            biases_of=names,
+            rank=rank,
+            fitness=float(fitness[row]),
+            margin=margin,
+            rival=None if margin is None else design(rival),
         )
-        fits.append((names, rounded if rounded.rank <= exact.rank else exact))
-    fits.sort(key=lambda fit: (fit[1].rank, -(fit[1].margin or 0.0)))
+        fits.append((rank, -(margin or 0.0), fit))
+    fits.sort(key=lambda fit: fit[:2])
     better = (plain <= plain[row]).all(axis=1) & (plain < plain[row]).any(axis=1)
-    wins = fits[0][1].rank == 1
+    wins = fits[0][0] == 1
     return PreferenceForView(
         chosen=design(row),
         on_front=not better.any(),
         wins=wins,
         certain=wins or (spec.worlds is None and spec.scenario_aggregate == "mean"),
-        fits=[
-            PreferenceFitView(
-                preference=fit.preference,
-                biases_of=names,
-                rank=fit.rank,
-                fitness=fit.fitness,
-                margin=fit.margin,
-                rival=None if fit.rival is None else design(fit.rival),
-            )
-            for names, fit in fits
-        ],
+        fits=[fit for *_, fit in fits],
     )
-
-
-class _Fit(NamedTuple):
-    """Rank of a design under a preference; rival: the best row that is not equal to it."""
-
-    preference: Preference
-    rank: int
-    fitness: float
-    rival: int | None
-    margin: float | None
-
-
-def _fit(
-    columns: EvaluationColumns,
-    row: int,
-    others: Rows,
-    preference: Preference,
-    aggregation: Aggregation | None,
-) -> _Fit:
-    """Rank a design by a preference; others: rows not equal to it."""
-    fitness = fitness_by(columns, preference, aggregation=aggregation)
-    rank = int(np.count_nonzero(fitness[others] < fitness[row])) + 1
-    rival = int(others[fitness[others].argmin()]) if len(others) else row
-    if rival == row or not np.isfinite(fitness[rival]):
-        return _Fit(preference, rank, float(fitness[row]), None, None)
-    with np.errstate(all="ignore"):
-        ratio = float((fitness[rival] / fitness[row]) ** (1.0 / sum(preference.exponent)))
-    return _Fit(preference, rank, float(fitness[row]), rival, ratio - 1.0)
 
 
 def _exponents(vectors: Floats, row: int, others: Rows) -> Floats:
@@ -226,3 +337,100 @@ def _best_rank(lead: Floats, exponent: Floats) -> Floats:
         ]
     )
     return np.asarray(candidates[better.argmin()])
+
+
+Figures = Annotated[dict[str, float], Field(examples=[{"energy": 77.4, "speed": 0.043}])]
+
+
+class CandidatePreferenceView(View):
+    """A preference, and what the design that is optimal under it is worth."""
+
+    iteration: IterationIndex
+    particle: Particle
+    preference: Preference = Field(description="By which the optimum was searched for.")
+    named: str | None = Field(description="A, B or C of table 4.5; null for any other.")
+    recommended: bool = Field(description="Whether its fitness is the least.")
+    fitness: float = Field(
+        description="Factor by which objectives may get worse [1]: exp(0.05 sensitivity) risk"
+        " unevenness / (1 - failures).",
+        examples=[2.43],
+    )
+    sensitivity: float = Field(
+        description="Robustness index of the optimum over its own variables [1]."
+    )
+    failures: float = Field(description="Share of held-out worlds in which a scenario failed [1].")
+    risk: float = Field(
+        description="Mean of the objectives in the worst 5 % of these, by the nominal world [1]."
+    )
+    unevenness: float = Field(
+        description="Deviation of the changes from the reference over the scenarios, a factor [1]."
+    )
+    figures: Figures = Field(
+        description="Geometric means over the scenarios, in the units of table 4.1 and m/s;"
+        " `slowest` is the speed in the slowest scenario."
+    )
+    changes: Figures = Field(description="By which share they differ from the reference's [1].")
+    design: DesignValues
+
+
+class CandidatePreferencesView(View):
+    """Preferences judged by their optima: robustness, and evenness over the scenarios."""
+
+    job: JobName
+    worlds: int = Field(description="Held-out worlds in which each optimum was simulated.")
+    samples: int = Field(description="Designs simulated around each optimum.")
+    evaluated: int = Field(description="Preferences so far, including those without an optimum.")
+    reference: DesignValues
+    reference_figures: Figures = Field(description="Its figures, as of the candidates.")
+    candidates: list[CandidatePreferenceView] = Field(
+        description="Those with a feasible optimum, of least fitness first."
+    )
+
+
+def candidate_preferences(
+    job_id: str, spec: PreferencesSpec, columns: EvaluationColumns
+) -> CandidatePreferencesView:
+    """List the candidates of a search for preferences, from stored results."""
+    order = _best_first(columns.fitness)
+    if not len(order):
+        raise Conflict(f"job {job_id} has no preference with a feasible optimum yet")
+    names = [column.name for column in spec.columns]
+    rows = [dict(zip(names, row, strict=True)) for row in columns.objectives[order, 0].tolist()]
+    space, tuned = spec.design_space(), spec.tuning.design_space()
+    candidates = []
+    for place, values in zip(order.tolist(), rows, strict=True):
+        preference = preference_of(space.shown(columns.designs[place].tolist()))
+        assert preference is not None, "it has an optimum"  # noqa: S101
+        named = preference_name(preference)
+        relative = _as_speed({f.name: values[f"relative_{f.name}"] for f in FIGURES})
+        candidates.append(
+            CandidatePreferenceView(
+                iteration=int(columns.iteration[place]),
+                particle=int(columns.particle[place]),
+                preference=preference,
+                named=None if named == OWN else named,
+                recommended=place == order[0],
+                fitness=columns.fitness[place],
+                figures=_as_speed({f.name: values[f.name] for f in FIGURES}),
+                changes={name: value - 1.0 for name, value in relative.items()},
+                design=tuned.shown([values[name] for name in tuned.names]),
+                **{criterion.name: values[criterion.name] for criterion in CRITERIA},
+            )
+        )
+    start = spec.tuning.start_positions()[:1]
+    of_reference = {f.name: rows[0][f.name] / rows[0][f"relative_{f.name}"] for f in FIGURES}
+    return CandidatePreferencesView(
+        job=job_id,
+        worlds=spec.worlds,
+        samples=spec.samples,
+        evaluated=len(columns),
+        reference=tuned.shown(tuned.designs(start)[0].tolist()),
+        reference_figures=_as_speed(of_reference),
+        candidates=candidates,
+    )
+
+
+def _as_speed(figures: dict[str, float]) -> dict[str, float]:
+    """Replace the reciprocal of the speed."""
+    speed = 1.0 / figures.pop("reciprocal_speed")
+    return {**figures, "speed": speed}

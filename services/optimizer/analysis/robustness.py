@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.distribution import CONFIDENCE, resample_weights
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
-from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, resample_weights
-from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.designs import WalksRequest
+from gaitswarm.services.optimizer.jobs.preference import WEIGHED, WEIGHED_NAMES
 from gaitswarm.services.optimizer.jobs.sensitivity import (
     LocalSample,
     local_sample,
@@ -184,7 +184,7 @@ def robustness_view(
             for values in (sample.designs[:, sample.names.index(variable.name)],)
         ],
         held=list(sample.held),
-        objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
+        objectives=[ObjectiveView.model_validate(o) for o in WEIGHED],
     )
 
 
@@ -199,7 +199,7 @@ def sensitivities(
     The contribution of noise to a squared norm is subtracted; intervals are from a bootstrap over
     the designs.
     """
-    values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
+    values = objectives[:, :, : len(WEIGHED)]
     usable = usable_rows(values, failed)
     count = len(sample.designs)
     draws = swarm_uniform(0, _RESAMPLE, iteration=0, particles=_RESAMPLES, count=count)
@@ -217,15 +217,15 @@ def sensitivities(
         jacobian = [_named(variables, row) for row in slopes[0].T]
         views[name] = ScenarioRobustnessView(
             index=_interval(biased[-1], unbiased[-1]),
-            by_objective=_named(NORMALISED_NAMES, rows[-1]),
+            by_objective=_named(WEIGHED_NAMES, rows[-1]),
             by_variable=_named(variables, columns[-1]),
-            jacobian=_named(NORMALISED_NAMES, jacobian),
+            jacobian=_named(WEIGHED_NAMES, jacobian),
             walked=int(chosen.sum()),
             failed=int((~chosen).sum()),
         )
     return Sensitivities(
         index=_interval(float(np.mean(biased)), np.mean(unbiased, axis=0)),
-        by_objective=_named(NORMALISED_NAMES, np.sqrt(np.mean(np.square(rows), axis=0))),
+        by_objective=_named(WEIGHED_NAMES, np.sqrt(np.mean(np.square(rows), axis=0))),
         by_variable=_named(variables, np.sqrt(np.mean(np.square(columns), axis=0))),
         scenarios=views,
     )

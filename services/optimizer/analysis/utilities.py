@@ -21,7 +21,6 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, PREFERENCES, Preference
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.outcome import OBJECTIVES
 
 PreferenceOwner = Literal["job", "A", "B", "C"]
 
@@ -32,10 +31,6 @@ NAMED: Final[Mapping[PreferenceOwner, Preference]] = {
 }
 """Preferences of table 4.5."""
 
-NORMALISED_OBJECTIVES: Final = OBJECTIVES[:5]
-"""f1 to f5 of table 4.1, weighed by the preferences of chapter 4; f6 may be negative."""
-
-NORMALISED_NAMES: Final = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 
 _BLOCK: Final = 4096
 """Rows at a time, for the processor's cache."""
@@ -94,20 +89,16 @@ def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
     return result
 
 
-def fitness_of(log_utility: Floats) -> Floats:
-    """Return the (r,) geometric means over scenarios (eq. 4.2); +inf after failure or overflow."""
-    failed = np.isposinf(log_utility).any(axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        fitness = np.exp(log_utility.mean(axis=1))
-    return np.where(failed, np.inf, fitness)
-
-
 def fitness_by(
     columns: EvaluationColumns, preference: Preference, *, aggregation: Aggregation | None = None
 ) -> Floats:
-    """Return the (r,) fitness by a preference, +inf for a failed design."""
+    """Return the (r,) fitness by a preference (eq. 4.2), +inf after failure or overflow."""
     logarithms = log_utilities(columns, preference)
-    return fitness_of(logarithms if aggregation is None else aggregation.aggregated(logarithms))
+    if aggregation is not None:
+        logarithms = aggregation.aggregated(logarithms)
+    failed = np.isposinf(logarithms).any(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.where(failed, np.inf, np.exp(logarithms.mean(axis=1)))
 
 
 def objective_vectors(
@@ -120,10 +111,7 @@ def objective_vectors(
     result = np.empty((len(columns), len(bias)))
     for m, exponent in enumerate(np.eye(len(bias)).tolist()):
         alone = Preference(bias=tuple(bias), exponent=tuple(exponent))
-        logarithms = log_utilities(columns, alone)
-        result[:, m] = fitness_of(
-            logarithms if aggregation is None else aggregation.aggregated(logarithms)
-        )
+        result[:, m] = fitness_by(columns, alone, aggregation=aggregation)
     result[~np.isfinite(result).all(axis=1)] = np.inf
     return result
 

@@ -5,27 +5,29 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.bounds import (
     NEAR,
+    ClosestView,
     End,
+    LimitView,
     WidenedView,
     bound_at,
+    limit_views,
     with_wider_bounds,
 )
-from gaitswarm.services.optimizer.analysis.feasibility import ClosestView, LimitView, limit_views
 from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.reference import Reference, ReferenceView
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS
@@ -36,8 +38,7 @@ SAME: Final = 0.005
 """Relative difference up to which two values are the same [1]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
+class Quantity(NamedTuple):
     """A quantity in users' units, with the words for its change."""
 
     name: str
@@ -229,34 +230,30 @@ def compared(spec: JobSpec, objectives: Floats, reference: Reference) -> list[Qu
             for k, name in enumerate(names)
             if usable[k].any()
         }
-        if means:
-            weights = [spec.scenario_weights.get(name, 1.0) for name in means]
-            views.append(_quantity(quantity, means, weights))
-    return views
-
-
-def _quantity(
-    quantity: Quantity, means: Mapping[str, Sequence[float]], weights: Sequence[float]
-) -> QuantityView:
-    """means: logarithms of the objective, of the best design and of the reference, by scenario."""
-    sign = -1.0 if quantity.reciprocal else 1.0
-    figures = {
-        name: FigureView(
-            value=np.exp(sign * best),
-            reference=np.exp(sign * other),
-            change=np.expm1(sign * (best - other)),
-            judgement=_judged(best - other),
+        if not means:
+            continue
+        sign = -1.0 if quantity.reciprocal else 1.0
+        figures = {
+            name: FigureView(
+                value=np.exp(sign * best),
+                reference=np.exp(sign * other),
+                change=np.expm1(sign * (best - other)),
+                judgement=_judged(best - other),
+            )
+            for name, (best, other) in means.items()
+        }
+        weights = [spec.scenario_weights.get(name, 1.0) for name in means]
+        mean = float(np.average([best - other for best, other in means.values()], weights=weights))
+        views.append(
+            QuantityView(
+                name=quantity.name,
+                unit=quantity.unit,
+                change=np.expm1(sign * mean),
+                judgement=_judged(mean),
+                scenarios=figures,
+            )
         )
-        for name, (best, other) in means.items()
-    }
-    mean = float(np.average([best - other for best, other in means.values()], weights=weights))
-    return QuantityView(
-        name=quantity.name,
-        unit=quantity.unit,
-        change=np.expm1(sign * mean),
-        judgement=_judged(mean),
-        scenarios=figures,
-    )
+    return views
 
 
 def _judged(logarithm: float) -> Judgement:
@@ -294,7 +291,12 @@ def comparison_in_words(
     for view in views:
         yield from _losses(view, words[view.name])
     counts = counted(views)
-    yield _counts_in_words(counts, counts.total())
+    if counts["better"] == counts.total():
+        yield f"Better in all {counts.total()} figures."
+        return
+    words_of: dict[Judgement, str] = {"better": "better", "same": "the same", "worse": "worse"}
+    parts = [f"{text} in {counts[name]}" for name, text in words_of.items() if counts[name]]
+    yield f"{listed(parts).capitalize()} of {counts.total()} figures."
 
 
 def counted(views: Sequence[QuantityView]) -> Counter[Judgement]:
@@ -319,14 +321,6 @@ def _losses(view: QuantityView, quantity: Quantity) -> Iterator[str]:
         f"{quantity.worse.capitalize()} {where}in {most}: {losses[most].value:.3g} instead of"
         f" {losses[most].reference:.3g} {view.unit}."
     )
-
-
-def _counts_in_words(counts: Mapping[Judgement, int], total: int) -> str:
-    if counts.get("better") == total:
-        return f"Better in all {total} figures."
-    texts: dict[Judgement, str] = {"better": "better", "same": "the same", "worse": "worse"}
-    parts = [f"{text} in {counts[name]}" for name, text in texts.items() if counts.get(name)]
-    return f"{listed(parts).capitalize()} of {total} figures."
 
 
 def limits_reached(spec: JobSpec, results: Floats) -> list[LimitView]:
@@ -376,20 +370,15 @@ def relaxed(constraints: Sequence[Constraint], violated: Sequence[LimitView]) ->
 
 def bounds_reached(spec: JobSpec, design: Floats) -> list[BoundView]:
     """Return variables of a design at a bound."""
-    reached, wider = [], spec
+    reached: list[BoundView] = []
+    wider: Spec = spec
     for variable, value in zip(spec.design_space().variables, design.tolist(), strict=False):
         at = bound_at(variable, value)
-        if at is None:
-            continue
-        widened = None
-        following = with_wider_bounds(wider, variable, at)
-        if following is not None:
-            wider = following
-            (found,) = (v for v in wider.design_space().variables if v.name == variable.name)
-            widened = WidenedView(low=found.low, high=found.high)
-        bound = variable.low if at == "low" else variable.high
-        fields = {"name": variable.name, "unit": variable.unit, "value": value}
-        reached.append(BoundView(**fields, at=at, bound=bound, widened=widened))
+        if at is not None:
+            wider, widened = with_wider_bounds(wider, variable, at)
+            fields = {"name": variable.name, "unit": variable.unit, "value": value}
+            bound = getattr(variable, at)
+            reached.append(BoundView(**fields, at=at, bound=bound, widened=widened))
     return reached
 
 

@@ -18,23 +18,25 @@ def _kind(value: Any) -> str:
 
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from gaitswarm.services.optimizer.jobs.kinds.calibration import (
+        CalibrationSpec,
+        IdentificationSpec,
+    )
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-    from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
     from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
     from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 
     AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec | PreferencesSpec
 else:
 
-    def _spec(kind, name):
+    def _spec(kind, name, module=None):
         """Member of the union, which is imported when a document of its kind is validated."""
-        module = f"gaitswarm.services.optimizer.jobs.kinds.{kind}"
-        return Annotated[Any, Imported(module, name), Tag(f"<{kind}>")]
+        path = f"gaitswarm.services.optimizer.jobs.kinds.{module or kind}"
+        return Annotated[Any, Imported(path, name), Tag(f"<{kind}>")]
 
     AnySpec = Annotated[
         _spec("tuning", "JobSpec")
-        | _spec("identification", "IdentificationSpec")
+        | _spec("identification", "IdentificationSpec", "calibration")
         | _spec("calibration", "CalibrationSpec")
         | _spec("certificate", "CertificateSpec")
         | _spec("preferences", "PreferencesSpec"),

@@ -18,9 +18,9 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
     ScenarioWeights,
     other_measure,
 )
-from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
+from gaitswarm.services.optimizer.jobs.spec import OptimizerChoice
 from gaitswarm.sim.input import Line
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.robot import RobotSource

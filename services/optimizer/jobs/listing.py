@@ -1,4 +1,4 @@
-"""Pages and cursors of lists, and entries that are not jobs"""
+"""Pages and cursors of lists, and entries that are not jobs: recordings and audits"""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from enum import StrEnum
 from typing import Any, Final, Generic, TypeVar
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -109,3 +110,43 @@ def from_cursor(order: str, text: str, kind: type) -> tuple[Any, str]:
         "not a cursor of this list in this order; pass the `next` of the page before",
         field="after",
     )
+
+
+LOCAL: Final = "local"
+"""Actor without a token: the command line, or a server bound to loopback. No token has this name.
+"""
+
+RETENTION: Final = "retention"
+"""Actor that deletes expired jobs. No token has this name."""
+
+
+class AuditAction(StrEnum):
+    """Audited action."""
+
+    SUBMIT = "submit"
+    FORK = "fork"
+    PAUSE = "pause"
+    RESUME = "resume"
+    EXTEND = "extend"
+    PRIORITIZE = "prioritize"
+    CANCEL = "cancel"
+    DELETE = "delete"
+    RESTORE = "restore"
+    KEEP = "keep"
+    RELEASE = "release"
+    LABEL = "label"
+    ADD_RECORDING = "add_recording"
+    CREATE_TOKEN = "create_token"  # noqa: S105
+    REVOKE_TOKEN = "revoke_token"  # noqa: S105
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """One change, written in the transaction that made it."""
+
+    index: int  # ascending with time
+    at: datetime  # UTC, by the database's clock
+    actor: str  # name of the token, or `LOCAL`, or `RETENTION`
+    action: AuditAction
+    job_id: str | None = None  # None for an action on no job; the job may have been deleted since
+    details: dict[str, Any] = field(default_factory=dict)  # further content, such as the new budget

@@ -13,7 +13,7 @@ from pydantic import Field, Tag, model_validator
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import NAME, OWN, Data, alternatives
-from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Outcome, Status
 
 _PIECE: Final = 4096
 """Values converted at a time, so that other Python threads can run in between."""
@@ -58,20 +58,13 @@ def by_design(outcomes: tuple[Outcome, ...]) -> tuple[Floats, NDArray[np.bool_]]
     return objectives, failed
 
 
-_FIELDS: Final = (
-    "torque",
-    "acceleration",
-    "angular_acceleration",
-    "energy",
-    "reciprocal_speed",
-    "height_loss",
-)
+WEIGHED: Final = OBJECTIVES[:5]
+"""f1 to f5 of table 4.1, weighed by the preferences of chapter 4; f6 may be negative."""
 
-HEIGHT_LOSS: Final = _FIELDS.index("height_loss")
+WEIGHED_NAMES: Final = OBJECTIVE_NAMES[:5]
+
+HEIGHT_LOSS: Final = OBJECTIVE_NAMES.index("height_loss")
 """Index of f6; preferences use its absolute value."""
-"""Simulations judged at a time: lists of a whole history would block a server's other threads while
-they are built and garbage-collected.
-"""
 
 # At an exponent of ten, five factors of a million still fit a double; beyond, a utility is
 # infinite, as for a failed simulation.
@@ -91,7 +84,7 @@ class Preference(Data):
         min_length=5,
         max_length=6,
         description="b_m >= 0, in the unit of f_m: "
-        + ", ".join(_FIELDS)
+        + ", ".join(OBJECTIVE_NAMES)
         + "; five, or six to include the last.",
         examples=[(0.9, 0.8, 0.24, 0.5, 0.8)],
     )

@@ -16,12 +16,7 @@ from gaitswarm.sim.provenance import LIBRARIES, Provenance, provenance_of, versi
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
-_JUDGING: Final = (
-    "jobs/design_space.py",
-    "jobs/optimizer_choice.py",
-    "jobs/preference.py",
-    "jobs/spec.py",
-)
+_JUDGING: Final = ("jobs/design_space.py", "jobs/preference.py", "jobs/spec.py")
 """Files that judge designs, for all kinds of jobs."""
 
 _FOLDERS: Final = ("jobs/kinds", "search")

@@ -13,23 +13,34 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import Judgement, by_design
-from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
 from gaitswarm.services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
     OPTIMIZERS,
     AutoSettings,
+    OptimizerName,
     OptimizerSettings,
     chosen_method,
     create_search,
@@ -38,6 +49,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import Line
 from gaitswarm.sim.kernel import Precision
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.variables import VariableChoice, VariableName, VariableValue
@@ -45,6 +57,67 @@ from gaitswarm.sim.variables import VariableChoice, VariableName, VariableValue
 if TYPE_CHECKING:
     from gaitswarm.sim.case import Case
     from gaitswarm.sim.identification import RecordedWalk, Recordings
+
+
+def optimizer_settings(choice: object) -> object:
+    """Resolve a name to settings, and insert the default method if none is given."""
+    if isinstance(choice, Mapping):
+        name = choice.get("name", DEFAULT_METHOD)
+        if isinstance(name, str):
+            if name not in METHODS:
+                raise ValueError(f"unknown method {name!r}; {METHODS.instead_of(name, METHODS)}")
+            _check_known(choice, METHODS[name].settings)
+        return {"name": name, **choice}
+    if not isinstance(choice, str):
+        return choice
+    if choice in OPTIMIZERS:
+        return OPTIMIZERS[choice]
+    reason = OPTIMIZERS.unknown(choice)
+    otherwise = "; or pass an object with settings" if "known are" in reason else ""
+    raise ValueError(f"{reason}{otherwise}")
+
+
+def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
+    """Apply settings on top of those of an optimizer."""
+    with suppress(ValueError):
+        choice = optimizer_settings(choice)
+    if isinstance(choice, SearchSettings):
+        choice = choice.model_dump()
+    if not isinstance(choice, Mapping):
+        return choice
+    name = settings.get("name", choice.get("name"))
+    return {**choice, **settings} if name == choice.get("name") else dict(settings)
+
+
+def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> None:
+    """Raise ValidationError for unknown settings, with suggestions."""
+    setting_names = [name for name in model.model_fields if name != "name"]
+    problems = [
+        InitErrorDetails(
+            type=PydanticCustomError(
+                "unknown_setting",
+                "no setting of {method}; {known}",
+                {
+                    "method": model.model_fields["name"].default,
+                    "known": instead_of(str(key), setting_names),
+                },
+            ),
+            loc=(str(key),),
+            input=value,
+        )
+        for key, value in settings.items()
+        if key not in model.model_fields
+    ]
+    if problems:
+        raise ValidationError.from_exception_data(model.__name__, problems)
+
+
+OptimizerChoice = Annotated[
+    OptimizerSettings,
+    BeforeValidator(optimizer_settings, json_schema_input_type=OptimizerName | OptimizerSettings),
+]
+"""Choice of a search method; validation replaces a name by settings."""
+
 
 _DESIGNS: Final = "<designs>"
 _JOBS: Final = "<jobs>"

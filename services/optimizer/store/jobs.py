@@ -20,7 +20,6 @@ from gaitswarm.services.optimizer.errors import (
     InvalidRequest,
     NotFound,
 )
-from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from gaitswarm.services.optimizer.jobs.documents import check_budget
 from gaitswarm.services.optimizer.jobs.fork import Fork
 from gaitswarm.services.optimizer.jobs.job import (
@@ -47,6 +46,9 @@ from gaitswarm.services.optimizer.jobs.labels import (
     robot_name,
 )
 from gaitswarm.services.optimizer.jobs.listing import (
+    LOCAL,
+    RETENTION,
+    AuditAction,
     Page,
     Queue,
     checked_limit,

@@ -14,8 +14,9 @@ from sqlalchemy import Connection, func, insert, select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import NotFound
-from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditAction
 from gaitswarm.services.optimizer.jobs.listing import (
+    LOCAL,
+    AuditAction,
     Page,
     RecordingEntry,
     checked_limit,

@@ -14,8 +14,8 @@ from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import mean_of_greatest
-from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
+from gaitswarm.services.optimizer.jobs.spec import OptimizerChoice
 from gaitswarm.services.optimizer.search.optimizer import CountedState, Optimizer, Stateful
 from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
 from gaitswarm.sim.arrays import Floats

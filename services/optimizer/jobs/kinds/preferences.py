@@ -21,9 +21,9 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.reference import nearest_design, reference_design
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
+    WEIGHED,
     Judgement,
     Preference,
     PreferenceName,
@@ -31,19 +31,16 @@ from gaitswarm.services.optimizer.jobs.preference import (
     exponential,
 )
 from gaitswarm.services.optimizer.jobs.sensitivity import local_sample, sensitivity_index
-from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.spec import OptimizerChoice, Spec
 from gaitswarm.services.optimizer.search.bayesian import BayesianSettings
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, run_together
 from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.kernel import Precision
-from gaitswarm.sim.outcome import OBJECTIVES, Objective, Outcome, Status
+from gaitswarm.sim.outcome import Objective, Outcome, Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable
-
-WEIGHED: Final = OBJECTIVES[:5]
-"""f1 to f5, weighed by the preferences of table 4.5."""
 
 VARIABLES: Final = tuple(
     Variable(name=f"{part}_{f.name}", low=0.0, high=1.0, unit=unit, description=text)

@@ -18,8 +18,7 @@ from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from gaitswarm.sim.replay import CONTROL_RATE, SAMPLED, Replay
 from gaitswarm.sim.replay import replay as replayed
 from gaitswarm.sim.robot import RobotFiles, load_robot
-from gaitswarm.sim.robot.actuators import TorqueActuator
-from gaitswarm.sim.robot.description import RobotDescription
+from gaitswarm.sim.robot.description import RobotDescription, TorqueActuator
 from gaitswarm.sim.robot.meshes import urdf_digest
 from gaitswarm.sim.robot.shapes import VisibleLink
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario

@@ -42,6 +42,7 @@ from gaitswarm.sim.robot.bounds import (
 )
 from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.limbs import feet_and_centre_of_mass, leg_points
 from gaitswarm.sim.robot.meshes import (
     FORMS,
     MeshFormat,
@@ -52,7 +53,6 @@ from gaitswarm.sim.robot.meshes import (
     package_places,
     served_meshes,
 )
-from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, leg_points
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import mesh_bounds
 from gaitswarm.sim.robot.urdf import unphysical

@@ -34,8 +34,7 @@ from gaitswarm.sim.measurement.measured_log import (
     simulated_log,
 )
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot.actuators import AnyActuator, TorqueActuator
-from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.robot.description import AnyActuator, Contact, TorqueActuator
 from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario

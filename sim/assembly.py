@@ -29,7 +29,7 @@ from gaitswarm.sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup, cur
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
-from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.robot.limbs import resting_height
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import body_corners
 from gaitswarm.sim.scenario import Scenario

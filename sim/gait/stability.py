@@ -13,7 +13,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.gait.gaits import leg_gaits, supporting
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
-from gaitswarm.sim.robot.posture import feet_and_centre_of_mass
+from gaitswarm.sim.robot.limbs import feet_and_centre_of_mass
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 

@@ -13,8 +13,8 @@ from gaitswarm.sim.controllers.base import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot.actuators import CONTROL_RATE
-from gaitswarm.sim.robot.posture import rotated
+from gaitswarm.sim.robot.description import CONTROL_RATE
+from gaitswarm.sim.robot.limbs import rotated
 from gaitswarm.sim.robot.robot import Robot
 
 

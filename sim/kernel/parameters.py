@@ -13,10 +13,14 @@ import numpy as np
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.robot.actuators import DIRECTIONAL_FRICTION, DryFriction
-from gaitswarm.sim.robot.description import JOINTS_PER_LEG, ContactLaw
-from gaitswarm.sim.robot.inertia import parallel_axis
+from gaitswarm.sim.robot.description import (
+    DIRECTIONAL_FRICTION,
+    JOINTS_PER_LEG,
+    ContactLaw,
+    DryFriction,
+)
 from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.urdf import parallel_axis
 from gaitswarm.sim.scenario import Scenario
 
 GRAVITY = 9.81

@@ -18,8 +18,7 @@ from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.sensors import NO_ERRORS, SensorErrors
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
-from gaitswarm.sim.robot.description import EnergyConvention
+from gaitswarm.sim.robot.description import CONTROL_RATE, LARGEST_OUTPUT, EnergyConvention
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.terrain import HeightGrid
 

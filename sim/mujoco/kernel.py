@@ -44,8 +44,8 @@ from gaitswarm.sim.mujoco.ground import GROUNDS
 from gaitswarm.sim.mujoco.mjcf import Rig, Soles, Surroundings, height_field, mjcf, reach_of
 from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot.inertia import BodyInertia, parallel_axis
 from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.urdf import BodyInertia, parallel_axis
 from gaitswarm.sim.terrain import HeightGrid
 
 RATE: Final = 5_000

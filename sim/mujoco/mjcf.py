@@ -17,9 +17,9 @@ import numpy as np
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.robot.description import Contact
-from gaitswarm.sim.robot.inertia import BodyInertia
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.urdf import BodyInertia
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.terrain import HeightGrid, height_grid
 

@@ -17,7 +17,7 @@ from gaitswarm.sim.gait.gaits import leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.mujoco.mjcf import TIMESTEP, Rig, Surroundings, mjcf
 from gaitswarm.sim.robot.description import Contact
-from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.robot.limbs import resting_height
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import visible_links
 from gaitswarm.sim.scenario import Scenario

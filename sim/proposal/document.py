@@ -56,10 +56,9 @@ from gaitswarm.sim.proposal.stance import (
     walk_within_reach,
 )
 from gaitswarm.sim.robot.bounds import check_urdf
-from gaitswarm.sim.robot.elements import by_line
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import parse_robot
-from gaitswarm.sim.robot.urdf import Urdf, parse_urdf, unphysical
+from gaitswarm.sim.robot.urdf import Urdf, by_line, parse_urdf, unphysical
 
 _LEVEL: Final = 0.2
 """Accepted height of hips above or below the body's origin, relative to the legs' length."""

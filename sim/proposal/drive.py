@@ -16,11 +16,10 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
-from gaitswarm.sim.robot.actuators import ActuatorKind, DryFriction
-from gaitswarm.sim.robot.elements import Joint
+from gaitswarm.sim.robot.description import ActuatorKind, DryFriction
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.library import ListedActuator, listed_actuator
-from gaitswarm.sim.robot.urdf import Urdf
+from gaitswarm.sim.robot.urdf import Joint, Urdf
 
 _ENOUGH, _PLAUSIBLE = 2.0, 60.0
 """Plausible torques of a URDF, relative to what standing on half the legs takes."""

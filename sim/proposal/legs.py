@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.frame import check_upright
 from gaitswarm.sim.robot.bounds import LARGEST
-from gaitswarm.sim.robot.chain import Chain, chain_of
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG, Leg
-from gaitswarm.sim.robot.elements import TURNS, Joint
-from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.legs import Chain, ChainLeg, chain_of
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.shapes import visual_meshes
-from gaitswarm.sim.robot.urdf import Solid, Urdf, parse_urdf
+from gaitswarm.sim.robot.urdf import TURNS, Joint, Solid, Urdf, parse_urdf
 
 Floats = NDArray[np.float64]
 
@@ -343,16 +341,8 @@ def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) 
 
 
 def _kinematics(name: str, chain: Chain, end: Floats) -> ChainLeg:
-    ends = np.clip(chain.limits, -np.pi, np.pi)
-    return ChainLeg(
-        name,
-        np.array([place.rotation for place in chain.placements]),
-        np.array([place.offset for place in chain.placements]),
-        np.array([place.axis for place in chain.placements]),
-        end,
-        ends.mean(axis=1),
-        chain.limits,
-    )
+    middle = np.clip(chain.limits, -np.pi, np.pi).mean(axis=1)
+    return ChainLeg.of(name, chain, end, middle)
 
 
 def reach_below(robot: Robot, number: int) -> float:

@@ -15,8 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import message_of
-from gaitswarm.sim.robot.actuators import Actuator, TorqueActuator
-from gaitswarm.sim.robot.description import Leg, RobotDescription
+from gaitswarm.sim.robot.description import Actuator, Leg, RobotDescription, TorqueActuator
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.variables import Variable, listed_variables
 

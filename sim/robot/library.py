@@ -12,8 +12,8 @@ from pydantic import Field
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.robot.actuators import ActuatorKind, DryFriction, PositionLoop
 from gaitswarm.sim.robot.bounds import Number
+from gaitswarm.sim.robot.description import ActuatorKind, DryFriction, PositionLoop
 
 
 class ListedActuator(DryFriction):

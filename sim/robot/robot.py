@@ -6,9 +6,8 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -17,31 +16,33 @@ from pydantic import BaseModel, ValidationError
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.input import message_of, with_known_keys
-from gaitswarm.sim.robot.actuators import (
+from gaitswarm.sim.robot.bounds import check_toml, shortened
+from gaitswarm.sim.robot.description import (
     DIRECTIONAL_FRICTION,
+    JOINTS_PER_LEG,
     Actuator,
+    Contact,
     DryFriction,
     Gearhead,
+    Leg,
     Motor,
     PositionLoop,
-    TorqueActuator,
-    TorqueCommand,
-)
-from gaitswarm.sim.robot.bounds import check_toml, shortened
-from gaitswarm.sim.robot.chain import chain_of, check_joints, check_owners
-from gaitswarm.sim.robot.description import (
-    JOINTS_PER_LEG,
-    Contact,
-    Leg,
     Pwm,
     RobotDescription,
     Sensors,
     Supply,
+    TorqueActuator,
+    TorqueCommand,
 )
-from gaitswarm.sim.robot.elements import MOST_TURNED, by_line
-from gaitswarm.sim.robot.inertia import BodyInertia
-from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
-from gaitswarm.sim.robot.urdf import Urdf, parse_urdf
+from gaitswarm.sim.robot.legs import (
+    ChainLeg,
+    KneeUpLeg,
+    LegKinematics,
+    chain_of,
+    check_joints,
+    check_owners,
+)
+from gaitswarm.sim.robot.urdf import MOST_TURNED, BodyInertia, Urdf, by_line, numbered, parse_urdf
 
 _TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
 _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
@@ -82,26 +83,14 @@ def first_problem(error: ValidationError, text: str) -> str:
     )
 
 
-@contextmanager
-def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
-    """Add line numbers to errors about a leg or the held joints of a robot.toml."""
-    try:
-        yield
-    except RobotFileError as error:
-        message = str(error)
-        named = [
-            k for k, leg in enumerate(legs) if message.startswith(f"robot.toml: leg {leg!r}: ")
-        ]
-        line = None
-        if named:
-            line = line_of(text, ["legs", named[0], *_FIELD.findall(message)[-1:]])
-        elif message.startswith("robot.toml: held_joints"):
-            line = line_of(text, ["held_joints"])
-        if line is None:
-            raise
-        raise RobotFileError(
-            message.replace("robot.toml: ", f"robot.toml, line {line}: ", 1)
-        ) from (error.__cause__ or error)
+def _line_of_part(text: str, legs: Sequence[Leg], message: str) -> int | None:
+    """Find the line of the leg, or of the held joints, that a message is about."""
+    for k, leg in enumerate(legs):
+        if message.startswith(f"robot.toml: leg {leg.name!r}: "):
+            return line_of(text, ["legs", k, *_FIELD.findall(message)[-1:]])
+    if message.startswith("robot.toml: held_joints"):
+        return line_of(text, ["held_joints"])
+    return None
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
@@ -398,7 +387,7 @@ def parse_robot(toml: str, urdf: str) -> Robot:
         description = RobotDescription.model_validate(document)
     except ValidationError as error:
         raise RobotFileError(first_problem(error, toml)) from error
-    with by_leg(toml, [leg.name for leg in description.legs]):
+    with numbered("robot.toml", partial(_line_of_part, toml, description.legs)):
         return assembled(description, urdf)
 
 
@@ -417,15 +406,7 @@ def _kinematics(leg: Leg, urdf: Urdf) -> LegKinematics:
     if leg.stance is not None:
         stance = np.array(leg.stance)
         _check_stance(leg, stance, chain.limits)
-        return ChainLeg(
-            leg.name,
-            np.array([place.rotation for place in places]),
-            np.array([place.offset for place in places]),
-            np.array([place.axis for place in places]),
-            chain.foot,
-            stance,
-            chain.limits,
-        )
+        return ChainLeg.of(leg.name, chain, chain.foot, stance)
     for name, place in zip(leg.joints, places, strict=True):
         if (place.rotation != np.eye(3)).any():
             raise RobotFileError(

@@ -16,12 +16,10 @@ from pydantic import Field
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.memory import require_room_for_scipy
-from gaitswarm.sim.robot.chain import chain_of
 from gaitswarm.sim.robot.description import Leg
-from gaitswarm.sim.robot.elements import origin_of
-from gaitswarm.sim.robot.legs import LegKinematics
+from gaitswarm.sim.robot.legs import LegKinematics, chain_of
 from gaitswarm.sim.robot.robot import Robot
-from gaitswarm.sim.robot.urdf import Link, SolidKind
+from gaitswarm.sim.robot.urdf import Link, SolidKind, origin_of
 
 Colour = tuple[float, float, float, float]
 """Red, green, blue and opacity, 0 to 1."""

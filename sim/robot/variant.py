@@ -16,7 +16,6 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.input import NAME, Data, alternatives
-from gaitswarm.sim.robot.actuators import AnyActuator
 from gaitswarm.sim.robot.bounds import (
     DEEPEST,
     LONGEST_TOML,
@@ -26,7 +25,7 @@ from gaitswarm.sim.robot.bounds import (
     MOST_LINKS,
     MOST_VALUES,
 )
-from gaitswarm.sim.robot.description import ContactLaw, Leg, PlannedSoles
+from gaitswarm.sim.robot.description import AnyActuator, ContactLaw, Leg, PlannedSoles
 
 if TYPE_CHECKING:
     from gaitswarm.sim.robot.robot import Robot

@@ -23,7 +23,7 @@ from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
 from gaitswarm.sim.mujoco.mjcf import Soles
 from gaitswarm.sim.outcome import N_OBJECTIVES, Objective, Outcome
 from gaitswarm.sim.robot import RobotSource, load_robot
-from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles, rotated
+from gaitswarm.sim.robot.limbs import feet_in_body, height_on_soles, rotated
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, plan_of_scenario, walking

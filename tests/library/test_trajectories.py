@@ -19,7 +19,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import walking_proposal
 from gaitswarm.sim.proposal.legs import LegHints
 from gaitswarm.sim.robot import RobotFiles, load_robot
-from gaitswarm.sim.robot.posture import feet_in_body
+from gaitswarm.sim.robot.limbs import feet_in_body
 from tests.examples.walks import quadruped_files, short_walk
 from tests.robots.test_proposal import dog
 

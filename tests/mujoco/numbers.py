@@ -12,8 +12,7 @@ from gaitswarm.sim.mujoco.gears import Gears, gears_of
 from gaitswarm.sim.mujoco.ground import GROUNDS, Ground
 from gaitswarm.sim.mujoco.mjcf import Surroundings
 from gaitswarm.sim.mujoco.model import Feet, even_drags
-from gaitswarm.sim.robot.actuators import DIRECTIONAL_FRICTION
-from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.robot.description import DIRECTIONAL_FRICTION, Contact
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 

@@ -16,7 +16,7 @@ from gaitswarm.sim.proposal import from_xacro
 from gaitswarm.sim.proposal.document import propose_robot, walking_proposal
 from gaitswarm.sim.proposal.formats import as_urdf, format_of
 from gaitswarm.sim.proposal.from_xacro import expanded
-from gaitswarm.sim.robot.actuators import ActuatorKind
+from gaitswarm.sim.robot.description import ActuatorKind
 from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.robots.test_proposal import INERTIAL, dog

@@ -15,7 +15,7 @@ from gaitswarm.sim.proposal.document import propose_robot
 from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.legs import find_legs
 from gaitswarm.sim.robot.legs import ChainLeg
-from gaitswarm.sim.robot.posture import feet_in_body
+from gaitswarm.sim.robot.limbs import feet_in_body
 from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.robot.urdf import parse_urdf
 from gaitswarm.sim.scenario import Scenario

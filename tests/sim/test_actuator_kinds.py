@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, WalksSpec
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.robot import RobotFiles, load_robot
-from gaitswarm.sim.robot.actuators import TorqueActuator
+from gaitswarm.sim.robot.description import TorqueActuator
 from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
 from gaitswarm.sim.robot.robot import parse_robot
 from tests.examples.walks import quadruped_files, short_walk, torque_quadruped_files

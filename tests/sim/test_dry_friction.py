@@ -9,7 +9,7 @@ from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.parameters import HOLDING_FREQUENCY, Layout, pack_parameters
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.actuators import DryFriction
+from gaitswarm.sim.robot.description import DryFriction
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import simulate

@@ -17,7 +17,7 @@ from gaitswarm.sim.gait.half_ellipse import half_ellipse
 from gaitswarm.sim.gait.inverse_kinematics import leg_angles
 from gaitswarm.sim.gait.trajectory import desired_angles, n_ticks, require_reachable
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.posture import feet_below_body, resting_height
+from gaitswarm.sim.robot.limbs import feet_below_body, resting_height
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 

@@ -13,7 +13,7 @@ from gaitswarm.sim.gait.gaits import GAITS, find_gait, lags_of, leg_gaits, suppo
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.posture import feet_in_body
+from gaitswarm.sim.robot.limbs import feet_in_body
 from gaitswarm.sim.robot.robot import Robot, leg_groups, parse_robot
 from gaitswarm.sim.scenario import GAIT_NAMES, GaitName, Scenario, find_scenario
 from tests.examples.walks import logged_walk, quadruped_files, short_walk

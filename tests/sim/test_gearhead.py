@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.parameters import pack_parameters
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.actuators import Actuator
+from gaitswarm.sim.robot.description import Actuator
 from gaitswarm.sim.scenario import SCENARIOS
 
 Floats = NDArray[np.float64]

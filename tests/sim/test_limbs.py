@@ -18,11 +18,10 @@ from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
 from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import SHIPPED, RobotFiles, load_robot
-from gaitswarm.sim.robot.chain import Placement
-from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.legs import Placement
 from gaitswarm.sim.robot.limbs import limb_of, limbs_of
 from gaitswarm.sim.robot.robot import Robot, parse_robot
-from gaitswarm.sim.robot.urdf import parse_urdf
+from gaitswarm.sim.robot.urdf import BodyInertia, parse_urdf
 from tests.examples.paths import QUADRUPED
 from tests.examples.walks import short_walk, walk
 from tests.sim.pinocchio_oracle import Oracle, robot_named

@@ -12,7 +12,7 @@ from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.replay import Replay, replay, ticks_at
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
-from gaitswarm.sim.robot.posture import feet_below_body
+from gaitswarm.sim.robot.limbs import feet_below_body
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.paths import QUADRUPED

@@ -8,7 +8,7 @@ import pytest
 
 from gaitswarm.sim.gait.stability import static_stability, support_margin
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, feet_in_body
+from gaitswarm.sim.robot.limbs import feet_and_centre_of_mass, feet_in_body
 from gaitswarm.sim.robot.robot import Robot
 from tests.examples.walks import quadruped_files, short_walk
 

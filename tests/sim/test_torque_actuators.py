@@ -23,7 +23,7 @@ from gaitswarm.sim.kernel.parameters import HOLDING_FREQUENCY, pack_parameters
 from gaitswarm.sim.kernel.walk import WalkResult, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.actuators import TorqueActuator
+from gaitswarm.sim.robot.description import TorqueActuator
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import simulate

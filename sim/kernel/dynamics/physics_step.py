@@ -41,11 +41,11 @@ from gaitswarm.sim.kernel.dynamics.limb import (
 )
 from gaitswarm.sim.kernel.dynamics.spatial import Force, Scalar, add, leaves, mapped
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
-from gaitswarm.sim.robot.chain import Placement
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
-from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.legs import Placement
 from gaitswarm.sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
 from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.urdf import BodyInertia
 
 Trees = TypeVarTuple("Trees")
 T = TypeVar("T")

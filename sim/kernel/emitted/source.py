@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from gaitswarm.sim.compiler.compilation import vector_header
 from gaitswarm.sim.kernel.dynamics.kinds import limb_kinds
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
-from gaitswarm.sim.robot.actuators import CONTROL_RATE
+from gaitswarm.sim.robot.description import CONTROL_RATE
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.robot.robot import Robot
 

@@ -15,8 +15,7 @@ from gaitswarm.sim.compiler.compilation import find_compiler, without_compiler
 from gaitswarm.sim.controllers import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait.feed_forward import carrying_torques
-from gaitswarm.sim.gait.trajectory import Trajectory, desired_angles
+from gaitswarm.sim.gait.trajectory import Trajectory, carrying_torques, desired_angles
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.parameters import (
     GRAVITY,

@@ -60,7 +60,7 @@ GaitName = Literal[
 GAIT_NAMES: Final[tuple[GaitName, ...]] = get_args(GaitName)
 
 CurveName = Literal["quadratic_spline", "half_ellipse", "cycloid"]
-"""Shape of the swing; each is a module of `gaitswarm.sim.gait`."""
+"""Shape of the swing, see `gaitswarm.sim.gait.curves`."""
 
 BY_LEG_GROUP: Final = ("stride", "height", "duty_factor", "start_phase", "radius")
 """Fields that can be set for groups of legs."""

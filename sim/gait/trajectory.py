@@ -1,10 +1,14 @@
-"""A scenario's desired joint angles: foot curve -> inverse kinematics -> hold -> FIR filter."""
+"""A scenario's desired joint angles: foot curve -> inverse kinematics -> hold -> FIR filter.
+
+Also the joint torques with which the legs on the ground carry the robot.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final, Literal
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +16,17 @@ from numpy.typing import NDArray
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
-from gaitswarm.sim.gait.cycloid import cycloid
+from gaitswarm.sim.gait.curves import foot_curve
 from gaitswarm.sim.gait.gaits import LegGait, Sway, leg_gaits
-from gaitswarm.sim.gait.half_ellipse import half_ellipse
 from gaitswarm.sim.gait.inverse_kinematics import chain_angles, leg_angles
-from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
 from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
-from gaitswarm.sim.robot.legs import ChainLeg, LegKinematics
+from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 from gaitswarm.sim.robot.robot import Robot
-from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.scenario import CurveName, Scenario
+
+T = TypeVar("T")
+Feet = TypeVar("Feet")
 
 _BLOCK: Final = 2048
 """Ticks filtered together, so that sums stay in the processor's cache."""
@@ -68,12 +73,6 @@ def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") 
 
 _DECIMALS: Final = 12
 """Decimals of angles in radians: a start pose is not coded, and must be equal on all machines."""
-
-_CURVES: Final = {
-    "half_ellipse": half_ellipse,
-    "quadratic_spline": quadratic_spline,
-    "cycloid": cycloid,
-}
 
 Limits = tuple[tuple[float, float], ...]
 
@@ -166,7 +165,7 @@ class _Gait:
     ticks: int
     cycle_time: float
     sway: Sway | None
-    curve: str
+    curve: CurveName
     backward: bool
     trajectory_rate: float
     fir_ms: int
@@ -201,9 +200,7 @@ def n_ticks(scenario: Scenario) -> int:
 
 def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
     """Return a whole walk's desired angles, filtered as the robot's controller receives them."""
-    feet, gait = _feet(robot, scenario), _Gait.of(scenario)
-    plan = _cached_trajectory if gait.ticks <= _LONGEST_CACHED else _trajectory
-    return plan(feet, gait)
+    return _trajectory(_feet(robot, scenario), _Gait.of(scenario))
 
 
 def stance_angles(robot: Robot, scenario: Scenario) -> Floats:
@@ -238,6 +235,12 @@ def _foot(
     )
 
 
+def _cached_if_short(plan: Callable[[Feet, _Gait], T]) -> Callable[[Feet, _Gait], T]:
+    cached = lru_cache(maxsize=_CACHE_SIZE)(plan)
+    return lambda feet, gait: (cached if gait.ticks <= _LONGEST_CACHED else plan)(feet, gait)
+
+
+@_cached_if_short
 def _trajectory(feet: tuple[_KneeUpFoot | _ChainFoot, ...], gait: _Gait) -> Trajectory:
     alike = {foot: number for number, foot in enumerate(dict.fromkeys(feet))}
     planned = [_planned(foot, gait) for foot in alike]
@@ -253,19 +256,12 @@ def _trajectory(feet: tuple[_KneeUpFoot | _ChainFoot, ...], gait: _Gait) -> Traj
     return Trajectory(columns, joints, miss, excess)
 
 
-_cached_trajectory: Final = lru_cache(maxsize=_CACHE_SIZE)(_trajectory)
-
-
+@_cached_if_short
 def _planned(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, float, Floats]:
-    plan = _unfiltered if gait.ticks <= _LONGEST_CACHED else _unfiltered.__wrapped__
-    return plan(foot, gait)
-
-
-@lru_cache(maxsize=_CACHE_SIZE)
-def _unfiltered(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, float, Floats]:
     """Angles (T, 3) [rad], the largest miss [m], and by joint the largest excess (3,) [rad]."""
     cycles, leg = gait.time() / gait.cycle_time, foot.gait
-    forward, lift = _CURVES[gait.curve](
+    forward, lift = foot_curve(
+        gait.curve,
         np.mod(cycles + leg.phase, 1.0),
         stride=leg.stride,
         height=leg.height,
@@ -284,14 +280,10 @@ def _unfiltered(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, fl
     return angles, float(miss.max()), np.maximum(0.0, excess)
 
 
-def require_reachable(robot: Robot, scenario: Scenario) -> None:
-    """Check that the legs reach the planned feet; takes no longer for a long walk."""
-    _check_reach(robot, scenario)
-
-
 # Cached: most jobs have the same scenarios.
 @lru_cache(maxsize=_CACHE_SIZE)
-def _check_reach(robot: Robot, scenario: Scenario) -> None:
+def require_reachable(robot: Robot, scenario: Scenario) -> None:
+    """Check that the legs reach the planned feet; takes no longer for a long walk."""
     gait = _Gait.of(scenario)
     gait = replace(gait, ticks=min(gait.ticks, _CHECKED_TICKS))
     feet = _feet(robot, scenario)
@@ -307,3 +299,37 @@ def _check_reach(robot: Robot, scenario: Scenario) -> None:
         leg = robot.legs[joint // JOINTS_PER_LEG].name
         name = robot.joint_names[joint]
         raise BeyondJointLimit(scenario.name, leg, name, float(excess[joint]))
+
+
+def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Floats:
+    """Feed-forward of a walk (T, J) [N m]: the feet on the ground share the robot's weight evenly.
+
+    tau = -J^T (0, 0, f), the static part of that of Di Carlo et al. (Dynamic locomotion in the MIT
+    Cheetah 3 through convex model-predictive control, 2018); the body is level, without load.
+    """
+    angles = trajectory.angles
+    height, slopes = np.empty((len(angles), len(robot.legs))), np.empty_like(angles)
+    for number, leg in enumerate(robot.legs):
+        joints = slice(JOINTS_PER_LEG * number, JOINTS_PER_LEG * (number + 1))
+        height[:, number], slopes[:, joints] = _height(leg, angles[:, joints])
+    lowest, highest = height.min(axis=0), height.max(axis=0)
+    # The filter rounds a foot's path; 0.1 mm is more than the rounding errors of a standing robot.
+    down = height <= lowest + np.maximum(0.1 * (highest - lowest), 1e-4)
+    force = robot.mass * gravity / np.maximum(down.sum(axis=1), 1)
+    forces = np.repeat(down * force[:, np.newaxis], JOINTS_PER_LEG, axis=1)
+    # numpy's functions of angles differ in the last bit between processors.
+    return np.round(-forces * slopes, 9)
+
+
+def _height(leg: LegKinematics, angles: Floats) -> tuple[Floats, Floats]:
+    """Height of the foot in the body's frame (T,) [m], and its derivatives by angle (T, 3) [m]."""
+    if isinstance(leg, ChainLeg):
+        at, slopes = leg.feet(angles)
+        return at[:, 2], slopes[:, 2, :]
+    assert isinstance(leg, KneeUpLeg)  # noqa: S101
+    _, femur, tibia = leg.lengths
+    first, both = angles[:, 1], angles[:, 1] + angles[:, 2]
+    height = leg.hip[2] + femur * np.sin(first) + tibia * np.sin(both)
+    outward = tibia * np.cos(both)
+    turned = [np.zeros(len(angles)), femur * np.cos(first) + outward, outward]
+    return height, np.stack(turned, axis=1)

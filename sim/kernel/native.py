@@ -18,9 +18,8 @@ from gaitswarm.sim.compiler.compilation import Target, load_library
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable, Response
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.kernel import Precision
-from gaitswarm.sim.kernel.derivation import derived_source
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
-from gaitswarm.sim.kernel.emitted.source import kernel_identity
+from gaitswarm.sim.kernel.emitted.source import derived_source, kernel_identity
 from gaitswarm.sim.kernel.lanes import plan_lanes
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.walk import (

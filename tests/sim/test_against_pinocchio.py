@@ -10,8 +10,7 @@ import pinocchio as pin
 import pytest
 
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
-from gaitswarm.sim.kernel.dynamics.body import body_of, body_state
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState, body_of, body_state
 from gaitswarm.sim.kernel.dynamics.limb import links_at
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.dynamics.spatial import (

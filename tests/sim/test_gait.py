@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import UnreachablePose
-from gaitswarm.sim.gait.half_ellipse import half_ellipse
+from gaitswarm.sim.gait.curves import foot_curve
 from gaitswarm.sim.gait.inverse_kinematics import leg_angles
 from gaitswarm.sim.gait.trajectory import desired_angles, n_ticks, require_reachable
 from gaitswarm.sim.robot import load_robot
@@ -24,7 +24,7 @@ from gaitswarm.sim.scenario import SCENARIOS, Scenario
 
 def test_support_is_a_straight_line_at_constant_speed_and_swing_a_half_ellipse() -> None:
     phase = np.linspace(0.0, 1.0, 1001)[:-1]
-    forward, lift = half_ellipse(phase, stride=0.16, height=0.03, duty_factor=0.56)
+    forward, lift = foot_curve("half_ellipse", phase, stride=0.16, height=0.03, duty_factor=0.56)
     support = phase < 0.56
     np.testing.assert_allclose(np.diff(forward[support]), -0.16 / 0.56 * 0.001, rtol=1e-9)
     assert not lift[support].any()
@@ -36,7 +36,7 @@ def test_support_is_a_straight_line_at_constant_speed_and_swing_a_half_ellipse()
 
 def test_the_curve_is_closed_and_continuous() -> None:
     phase = np.array([0.56 - 1e-9, 0.56, 1.0 - 1e-9, 0.0])
-    forward, lift = half_ellipse(phase, stride=0.16, height=0.03, duty_factor=0.56)
+    forward, lift = foot_curve("half_ellipse", phase, stride=0.16, height=0.03, duty_factor=0.56)
     np.testing.assert_allclose(forward, [-0.08, -0.08, 0.08, 0.08], atol=1e-8)
     np.testing.assert_allclose(lift, 0.0, atol=1e-8)
 
@@ -221,7 +221,8 @@ def angles_of_one_leg(robot: Robot, scenario: Scenario, leg: int) -> np.ndarray:
     geometry = robot.legs[leg]
     phase = robot.description.legs[leg].phase + scenario.start_phase
     time = np.arange(n_ticks(scenario)) * CONTROL_PERIOD
-    forward, lift = half_ellipse(
+    forward, lift = foot_curve(
+        "half_ellipse",
         np.mod(time / scenario.cycle_time + phase, 1.0),
         stride=scenario.stride_of(geometry.side),
         height=scenario.height,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
-from gaitswarm.sim.gait.cycloid import cycloid
+from gaitswarm.sim.gait.curves import foot_curve
 from gaitswarm.sim.gait.gaits import GAITS, find_gait, lags_of, leg_gaits, supporting
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
@@ -182,7 +182,7 @@ def test_feet_keep_their_places_on_the_ground_while_the_body_sways(
 
 def test_a_cycloid_leaves_the_ground_and_comes_down_without_speed() -> None:
     phase = np.linspace(0.0, 1.0, 10001)[:-1]
-    forward, lift = cycloid(phase, stride=0.1, height=0.03, duty_factor=0.6)
+    forward, lift = foot_curve("cycloid", phase, stride=0.1, height=0.03, duty_factor=0.6)
     stands = phase < 0.6
     np.testing.assert_allclose(np.diff(forward[stands]), -0.1 / 0.6 * 1e-4, rtol=1e-6)
     assert not lift[stands].any()

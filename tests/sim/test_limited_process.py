@@ -16,8 +16,7 @@ from gaitswarm.sim.errors import (
     RobotFileError,
     SimulationInputError,
 )
-from gaitswarm.sim.kernel import derivation
-from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.kernel.emitted import source
 from gaitswarm.sim.limited_process import LimitedProcesses
 from gaitswarm.sim.robot import check, load_robot
 from gaitswarm.sim.robot.check import check_files
@@ -144,9 +143,9 @@ def test_a_kernel_is_derived_in_another_process_to_the_same_text(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     robot = parse_robot(TOML, URDF)
-    expected = kernel_source(robot, "single")
-    monkeypatch.setattr(derivation, "kernel_source", None)
-    assert derivation.derived_source(robot, "single") == expected
+    expected = source.kernel_source(robot, "single")
+    monkeypatch.setattr(source, "kernel_source", None)
+    assert source.derived_source(robot, "single") == expected
 
 
 def test_a_kernel_whose_derivation_is_ended_is_an_error_that_names_the_robot(
@@ -155,13 +154,13 @@ def test_a_kernel_whose_derivation_is_ended_is_an_error_that_names_the_robot(
     def ended(_: object) -> dict[str, object]:
         raise ProcessEnded("took more than 4096 MiB of memory")
 
-    monkeypatch.setattr(derivation.PROCESSES, "ask", ended)
+    monkeypatch.setattr(source.PROCESSES, "ask", ended)
     with pytest.raises(KernelBuildError, match="'quadruped': its derivation took more than"):
-        derivation.derived_source(parse_robot(TOML, URDF))
+        source.derived_source(parse_robot(TOML, URDF))
 
 
 def test_a_robot_that_ships_is_derived_without_another_process(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(derivation.PROCESSES, "ask", None)
-    assert "kick" in derivation.derived_source(load_robot("szabadka2-identified"))
+    monkeypatch.setattr(source.PROCESSES, "ask", None)
+    assert "kick" in source.derived_source(load_robot("szabadka2-identified"))

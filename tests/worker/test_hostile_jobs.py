@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.sim.errors import ProcessEnded
-from gaitswarm.sim.kernel import derivation
+from gaitswarm.sim.kernel.emitted import source
 from gaitswarm.sim.robot import RobotFiles
 from tests.examples.hostile import TOML, URDF
 from tests.examples.processes import eventually
@@ -39,7 +39,7 @@ def test_a_robot_without_a_kernel_fails_its_job_and_the_runner_takes_the_next(
     def ended(_: object) -> dict[str, object]:
         raise ProcessEnded("took more than 4096 MiB of memory")
 
-    monkeypatch.setattr(derivation.PROCESSES, "ask", ended)
+    monkeypatch.setattr(source.PROCESSES, "ask", ended)
     # An axis that no robot had before: there is no kernel in the cache.
     tilted = f'<axis xyz="-1 0 {time.time_ns() % 10**9 * 1e-12:.12f}"/>'
     hostile = RobotFiles(toml=TOML, urdf=URDF.replace('<axis xyz="-1 0 0"/>', tilted))

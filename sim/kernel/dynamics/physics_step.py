@@ -17,8 +17,8 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
-from gaitswarm.sim.kernel.dynamics.body import (
+from gaitswarm.sim.kernel.dynamics.articulated_body import (
+    LinkState,
     body_integrands,
     body_lean,
     body_of,

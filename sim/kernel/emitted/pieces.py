@@ -9,8 +9,8 @@ from typing import Any, Final
 import casadi as ca
 import numpy as np
 
-from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
-from gaitswarm.sim.kernel.dynamics.body import (
+from gaitswarm.sim.kernel.dynamics.articulated_body import (
+    LinkState,
     body_integrands,
     body_lean,
     body_of,

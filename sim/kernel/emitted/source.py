@@ -1,4 +1,7 @@
-"""A robot's kernel as C source, and the digest of everything that the source depends on."""
+"""A robot's kernel as C source, and the digest of everything that the source depends on.
+
+Robots that do not ship are derived in a process with limits.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,27 @@ from importlib import metadata, resources
 from typing import TYPE_CHECKING, Final
 
 from gaitswarm.sim.compiler.compilation import vector_header
+from gaitswarm.sim.errors import KernelBuildError, ProcessEnded
 from gaitswarm.sim.kernel.dynamics.kinds import limb_kinds
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
-from gaitswarm.sim.robot.description import CONTROL_RATE
+from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
+from gaitswarm.sim.robot.description import CONTROL_RATE, RobotDescription
 from gaitswarm.sim.robot.limbs import limbs_of
-from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.robot import Robot, assembled
 
 if TYPE_CHECKING:
     from gaitswarm.sim.kernel import Precision
 
-_GENERATORS: Final = ("gaitswarm.sim.kernel.dynamics", "gaitswarm.sim.kernel.emitted")
-"""Packages whose files all determine the source, besides the layout of parameters."""
+# A derivation takes one or two seconds after one of start-up, and a tenth of the memory. Processes
+# are not kept: CasADi's symbols hold memory, and robots with a new kernel are rare.
+PROCESSES: Final = LimitedProcesses(
+    "gaitswarm.sim.kernel.emitted.source",
+    count=2,
+    seconds=120.0,
+    cpu_seconds=60,
+    memory=4 << 30,
+    kept=False,
+)
 
 _deriving: Final = threading.Lock()
 """CasADi's symbols must be created by one thread at a time."""
@@ -93,11 +106,40 @@ def _file(name: str) -> str:
 @lru_cache(maxsize=1)
 def _generator() -> bytes:
     """Digest of what the source of every robot's kernel depends on."""
+    kernel = resources.files("gaitswarm.sim.kernel")
     digest = hashlib.sha256(vector_header().encode())
-    digest.update((resources.files("gaitswarm.sim.kernel") / "parameters.py").read_bytes())
-    for package in _GENERATORS:
-        for file in sorted(resources.files(package).iterdir(), key=lambda file: file.name):
+    digest.update((kernel / "parameters.py").read_bytes())
+    for package in ("dynamics", "emitted"):
+        for file in sorted((kernel / package).iterdir(), key=lambda file: file.name):
             if file.name.endswith((".py", ".c", ".h")):
                 digest.update(file.read_bytes())
-    digest.update(f"{metadata.version('casadi')}".encode())
+    digest.update(metadata.version("casadi").encode())
     return digest.digest()
+
+
+def derived_source(robot: Robot, precision: Precision = "double", *, uneven: bool = False) -> str:
+    """Derive a kernel's C source; in a process with limits for a robot that does not ship."""
+    if robot.ships:
+        return kernel_source(robot, precision, uneven=uneven)
+    request = {
+        "description": robot.description.model_dump(mode="json"),
+        "urdf": robot.urdf.text,
+        "precision": precision,
+        "uneven": uneven,
+    }
+    try:
+        return str(PROCESSES.ask(request)["source"])
+    except ProcessEnded as error:
+        raise KernelBuildError(
+            f"no kernel for {robot.description.name!r}: its derivation {error}"
+        ) from error
+
+
+def _answer(request: Document) -> Document:
+    description = RobotDescription.model_validate(request["description"])
+    robot = assembled(description, request["urdf"])
+    return {"source": kernel_source(robot, request["precision"], uneven=request["uneven"])}
+
+
+if __name__ == "__main__":
+    serve(_answer)

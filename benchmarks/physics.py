@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.simulator import measure
-from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
+from gaitswarm.sim.assembly import PHYSICS_RATE, control_steps, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.reference import Stepper
@@ -40,7 +40,8 @@ def interpreter() -> Callable[[], float]:
     plan = plan_walk(robot, SCENARIOS[0], 1.0 / PHYSICS_RATE)
     assert plan is not None
     setup = plan(CONTROLLERS["p"].compile({"P": 0.25}))
-    stepper = Stepper(physics_model(robot), setup)
+    coding, _ = control_steps(robot)
+    stepper = Stepper(physics_model(robot), setup, coding, loose=robot.has_backlash)
 
     def step() -> None:
         stepper.kick()

@@ -1,9 +1,11 @@
-"""Control tick and inner loop of the Python drivers: twins of tick.c, control.c and inner.c."""
+"""The Python driver of a walk over any physics: twin of driver.c, tick.c, control.c and inner.c."""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,82 +13,151 @@ from numpy.typing import NDArray
 from gaitswarm.sim.arrays import Floats, Ints
 from gaitswarm.sim.controllers.base import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
-from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
+from gaitswarm.sim.kernel.sensors import Sensors
+from gaitswarm.sim.kernel.walk import (
+    CODE_LIMIT,
+    INTEGRANDS,
+    PEAKS,
+    Coding,
+    LaneUse,
+    WalkResult,
+    WalkResults,
+    WalkSetup,
+    check_setups,
+    coarsen,
+)
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot.description import CONTROL_RATE
 from gaitswarm.sim.robot.limbs import rotated
 from gaitswarm.sim.robot.robot import Robot
 
 
-@dataclass(slots=True)
-class Past:
-    """State of the controllers between ticks, (J,) each."""
+class Physics(Protocol):
+    """State of one walk, stepped in place."""
 
-    integral: Ints  # integrators [counts, with `INTEGRAL_BITS` fraction bits]
-    error: Ints | None = None  # of the previous tick [counts]; None before the first
+    peaks: Floats  # `PEAKS` of the last step
+    heights: Floats  # of the soles above the ground at the last step (L,) [m]
+    diverged: bool  # whether the last step left the engine's range
 
-    @classmethod
-    def of(cls, n_joints: int) -> Past:
-        return cls(np.zeros(n_joints, dtype=np.int64))
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Return q, v and internal state, as in `WalkResult.states`."""
 
+    def knees(self) -> Floats:
+        """Return the places of the tibias' joints in the world (L, 3) [m], on uneven ground."""
 
-def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
-    """Advance the filtered absolute currents (J,) [A] by a step, by a share of the distance."""
-    return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
+    def motors(self) -> tuple[Floats, Floats]:
+        """Return angles (J,) [rad] and rates (J,) [rad/s] that the encoders see."""
 
+    def begin(self, tick: int) -> tuple[int, float]:
+        """Begin a control tick; return its number of steps and the current's low-pass in each."""
 
-def coded(
-    angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
-) -> tuple[Ints, Ints]:
-    """Return angle error and absolute current, (J,) [counts], of readings in [rad] and [A]."""
-    error = desired.astype(np.int64) - coding.angle_codes(angles)
-    return np.clip(error, -CODE_LIMIT, CODE_LIMIT), coding.current_codes(current)
+    def step(self, duty: Floats) -> tuple[Floats, Floats]:
+        """Return `INTEGRANDS`, by the step's share of a usual one, and absolute currents (J,)."""
 
 
-def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past) -> Ints:
-    """Run a tick of all controllers (thesis 5.3): error and load to PWM, (J,) [counts]."""
-    change = np.zeros_like(error) if past.error is None else error - past.error
-    direct = error * law.proportional_gain + change * law.derivative_gain
-    grown = past.integral + error * law.integral_gain
-    if law.direct is not None:
-        direct = direct + law.direct.respond(error, load, change)
-    if law.integrated is not None:
-        grown = grown + law.integrated.respond(error, load, change)
-    full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
-    past.error, past.integral = error, np.clip(grown, -full, full)
-    output = descale(direct, FRACTION_BITS) + descale(past.integral, INTEGRAL_BITS)
-    coarse = coarsen(np.clip(output, -limit, limit), coding.pwm_step)
-    pwm: Ints = np.clip(coarse, -limit, limit)
-    return pwm
+class PythonKernel(ABC):
+    """Walks one after the other, some hundred times slower than the compiled kernel."""
+
+    lanes: Final = 1
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+
+    @abstractmethod
+    def _physics(self, setup: WalkSetup, coding: Coding) -> Physics:
+        """Return the physics of a walk at its start."""
+
+    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
+        """Compute the walks one after the other."""
+        check_setups(self._robot, setups)
+        walks = [self._walk(setup, coding, log=log) for setup in setups]
+        rounds = sum(walked for _, walked in walks)
+        return WalkResults(tuple(result for result, _ in walks), LaneUse(rounds, rounds))
+
+    def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
+        """Return the result of a walk and its number of rounds of physics steps."""
+        n_joints = self._robot.n_joints
+        physics, sensors = self._physics(setup, coding), Sensors(setup.sensors)
+        controllers = Controllers(setup.control_law, coding, n_joints)
+        inner, sensed = InnerLoop(self._robot, setup, coding), np.zeros(n_joints)
+        sums, peaks = np.zeros(len(INTEGRANDS)), np.zeros(len(PEAKS))
+        lifted, clearance = np.zeros(len(self._robot.legs)), math.inf
+        width = 13 + 4 * n_joints + len(setup.internal_state)
+        states = np.full((setup.ticks, width), np.nan) if log else None
+        status, rounds = Status.OK, 0
+        for tick, desired in enumerate(setup.desired):
+            angles, rates = physics.motors()
+            inner.begin(tick, controllers.output(*sensors.read(angles, sensed), desired))
+            duty = inner.command(angles, rates)
+            if states is not None:
+                states[tick] = np.concatenate([*physics.state(), sensed, duty])
+            steps, smoothing = physics.begin(tick)
+            rounds += steps // coding.substeps
+            for walked in range(steps):
+                if walked and walked % (steps // coding.inner_ticks) == 0:
+                    duty = inner.command(*physics.motors())
+                integrands, current = physics.step(duty)
+                sensed = current if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
+                sums += integrands
+                peaks, lifted = (
+                    np.maximum(peaks, physics.peaks),
+                    np.maximum(lifted, physics.heights),
+                )
+                if physics.diverged:
+                    break
+            if not physics.diverged and (tick + 1) % setup.cycle == 0:
+                clearance, lifted = min(clearance, float(lifted.min())), np.zeros_like(lifted)
+            status = _status(physics, setup)
+            if status is not Status.OK:
+                break
+        end = physics.state()[0].copy()
+        return WalkResult(status, sums, end, peaks, clearance, states), rounds
 
 
-def status_of(
-    q: Floats,
-    v: Floats,
-    internal_state: Floats,
-    setup: WalkSetup,
-    knees: Floats | None = None,
-) -> Status:
-    """Return the status at the end of a tick; `knees` (L, 3) [m] are required on uneven ground."""
-    if not all(np.isfinite(array).all() for array in (q, v, internal_state)):
+def _status(physics: Physics, setup: WalkSetup) -> Status:
+    """Return the status at the end of a tick."""
+    (q, *rest), grid = physics.state(), setup.terrain
+    if physics.diverged or not all(np.isfinite(array).all() for array in (q, *rest)):
         return Status.DIVERGED
     upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
-    grid = setup.terrain
     height = q[2] if grid is None else q[2] - grid.height(*q[:2])
     if height < setup.fall_height or upright < setup.fall_cosine:
         return Status.FELL
-    if grid is not None and knees is not None:
-        x, y, z = np.concatenate([knees, q[:3] + rotated(q[3:7], setup.corners)]).T
+    if grid is not None:
+        x, y, z = np.concatenate([physics.knees(), q[:3] + rotated(q[3:7], setup.corners)]).T
         if (z < grid.height(x, y)).any():
             return Status.STRUCK
     return Status.OK
 
 
-def padded_states(rows: Sequence[Floats], ticks: int) -> Floats:
-    """Pad the logged states to all ticks, as in `WalkResult`."""
-    states = np.full((ticks, len(rows[0])), np.nan)
-    states[: len(rows)] = rows
-    return states
+class Controllers:
+    """The control law of every joint from tick to tick (thesis 5.3)."""
+
+    def __init__(self, law: ControlLaw, coding: Coding, n_joints: int) -> None:
+        self._law, self._coding = law, coding
+        # Integrators [counts, with `INTEGRAL_BITS` fraction bits].
+        self._integral: Ints = np.zeros(n_joints, dtype=np.int64)
+        self._error: Ints | None = None  # of the previous tick [counts]
+
+    def output(self, angles: Floats, current: Floats, desired: NDArray[np.int32]) -> Ints:
+        """Return the PWM (J,) [counts] for readings (J,) in [rad] and [A]."""
+        law, coding = self._law, self._coding
+        load = coding.current_codes(current)
+        error = desired.astype(np.int64) - coding.angle_codes(angles)
+        error = np.clip(error, -CODE_LIMIT, CODE_LIMIT)
+        change = np.zeros_like(error) if self._error is None else error - self._error
+        direct = error * law.proportional_gain + change * law.derivative_gain
+        grown = self._integral + error * law.integral_gain
+        if law.direct is not None:
+            direct = direct + law.direct.respond(error, load, change)
+        if law.integrated is not None:
+            grown = grown + law.integrated.respond(error, load, change)
+        full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
+        self._error, self._integral = error, np.clip(grown, -full, full)
+        output = descale(direct, FRACTION_BITS) + descale(self._integral, INTEGRAL_BITS)
+        coarse = coarsen(np.clip(output, -limit, limit), coding.pwm_step)
+        pwm: Ints = np.clip(coarse, -limit, limit)
+        return pwm
 
 
 class InnerLoop:

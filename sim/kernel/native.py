@@ -29,7 +29,7 @@ from gaitswarm.sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
-    check_gains,
+    check_setups,
 )
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot.robot import Robot
@@ -243,8 +243,7 @@ class NativeKernel:
         self.lanes = int(library.gaitswarm_lanes())
         self.precision: Precision = "single" if library.gaitswarm_single() else "double"
         self.internal_state_size = internal_state_size(robot)
-        self._joints, self._torque = robot.n_joints, robot.is_torque_controlled
-        self._servo = robot.servos is not None
+        self._robot, self._joints = robot, robot.n_joints
         self._integrands = int(library.gaitswarm_integrands())
         self._log_width = 13 + 4 * self._joints + self.internal_state_size
         self._check(robot.description.name)
@@ -271,14 +270,7 @@ class NativeKernel:
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute all walks, `lanes` at a time, in the order of `plan_lanes`; calls share walks."""
-        for law in {id(s.control_law): s.control_law for s in setups}.values():
-            check_gains(law, torque=self._torque, servo=self._servo)
-        for setup in setups:
-            setup.check(
-                joints=self._joints,
-                internal_state=self.internal_state_size,
-                parameters=self.layout.size,
-            )
+        check_setups(self._robot, setups)
         n = len(setups)
         sums, end = np.empty((n, self._integrands)), np.empty((n, 7 + self._joints))
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]

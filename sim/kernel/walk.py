@@ -8,7 +8,7 @@ import time
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import astuple, dataclass, field
 from itertools import islice
-from typing import Any, Final, Protocol, Self, TypeVar
+from typing import Final, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gaitswarm.sim.arrays import Floats, Ints
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.sensors import NO_ERRORS, SensorErrors
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot.description import CONTROL_RATE, LARGEST_OUTPUT, EnergyConvention
@@ -180,25 +181,6 @@ class WalkSetup:
         """T, control ticks of the walk."""
         return len(self.desired)
 
-    def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
-        """Check the shapes of arrays that a kernel of these sizes reads."""
-        ticks = max(self.ticks, 1)
-        expected: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
-            "start": (self.start, (7 + joints,)),
-            "internal_state": (self.internal_state, (internal_state,)),
-            "parameters": (self.parameters, (parameters,)),
-            "desired": (self.desired, (ticks, joints)),
-        }
-        for name in ("disturbance", "feed_forward"):
-            optional = getattr(self, name)
-            if optional is not None:
-                expected[name] = (optional, (ticks, joints))
-        for name, (array, shape) in expected.items():
-            if array.shape != shape:
-                raise SimulationInputError(
-                    f"{name}: array of shape {array.shape}; this kernel and walk require {shape}"
-                )
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkResult:
@@ -319,6 +301,29 @@ def check_gains(law: ControlLaw, *, torque: bool, servo: bool = False) -> None:
     for name, term in largest.items():
         if abs(term) > _LARGEST_TERM:
             raise SimulationInputError(f"{name}: too large for the controllers' integers")
+
+
+def check_setups(robot: Robot, setups: Sequence[WalkSetup]) -> None:
+    """Check the control laws, and the shapes of arrays that a robot's kernel reads."""
+    for law in {id(setup.control_law): setup.control_law for setup in setups}.values():
+        check_gains(law, torque=robot.is_torque_controlled, servo=robot.servos is not None)
+    n = robot.n_joints
+    for setup in setups:
+        by_tick = max(setup.ticks, 1), n
+        shapes: dict[str, tuple[int, ...]] = {
+            "start": (7 + n,),
+            "internal_state": (internal_state_size(robot),),
+            "parameters": (Layout.of(robot).size,),
+            "desired": by_tick,
+            "disturbance": by_tick,
+            "feed_forward": by_tick,
+        }
+        for name, shape in shapes.items():
+            array = getattr(setup, name)
+            if array is not None and array.shape != shape:
+                raise SimulationInputError(
+                    f"{name}: array of shape {array.shape}; this kernel and walk require {shape}"
+                )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

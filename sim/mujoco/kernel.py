@@ -9,7 +9,7 @@ package's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -18,32 +18,13 @@ import numpy as np
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.kernel.control_tick import (
-    InnerLoop,
-    Past,
-    coded,
-    control,
-    low_pass,
-    padded_states,
-    status_of,
-)
-from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
-from gaitswarm.sim.kernel.sensors import Sensors
-from gaitswarm.sim.kernel.walk import (
-    INTEGRANDS,
-    PEAKS,
-    Coding,
-    LaneUse,
-    WalkResult,
-    WalkResults,
-    WalkSetup,
-    check_gains,
-)
+from gaitswarm.sim.kernel.control_tick import PythonKernel
+from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout
+from gaitswarm.sim.kernel.walk import PEAKS, Coding, WalkSetup
 from gaitswarm.sim.mujoco.gears import gears_of
 from gaitswarm.sim.mujoco.ground import GROUNDS
 from gaitswarm.sim.mujoco.mjcf import Rig, Soles, Surroundings, height_field, mjcf, reach_of
 from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
-from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.urdf import BodyInertia, parallel_axis
 from gaitswarm.sim.terrain import HeightGrid
@@ -68,20 +49,14 @@ _TICKS_PER_POLL: Final = 50
 """Control ticks between calls of `should_stop`."""
 
 
-def _multiple(rate: int, inner: int) -> int:
-    """Round a rate up to a multiple of the inner rate."""
-    return inner * math.ceil(rate / inner)
-
-
 class WalkStopped(Exception):
     """`should_stop` ended a walk."""
 
 
-class MujocoKernel:
+class MujocoKernel(PythonKernel):
     """Walks in MuJoCo, at a given rate of steps [Hz] or at `RATE`, `BACKLASH_RATE` or more."""
 
     backend: Final = "mujoco"
-    lanes: Final = 1
 
     def __init__(
         self,
@@ -91,79 +66,33 @@ class MujocoKernel:
         rate: int | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._robot, self._soles, self._should_stop = robot, soles, should_stop
+        super().__init__(robot)
+        self._soles, self._should_stop = soles, should_stop
+        # Multiples of the inner rate.
         inner = robot.description.inner_rate
-        self._rate = _multiple(rate or (BACKLASH_RATE if robot.has_backlash else RATE), inner)
-        self._landing_rate = _multiple(LANDING_RATE if rate is None else rate, inner)
-        self._layout = Layout(robot)
+        usual = rate or (BACKLASH_RATE if robot.has_backlash else RATE)
+        landing = LANDING_RATE if rate is None else rate
+        self._rates = inner * math.ceil(usual / inner), inner * math.ceil(landing / inner)
 
-    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """Compute the walks one after the other."""
-        for setup in setups:
-            check_gains(
-                setup.control_law,
-                torque=self._robot.is_torque_controlled,
-                servo=self._robot.servos is not None,
-            )
-            setup.check(
-                joints=self._robot.n_joints,
-                internal_state=internal_state_size(self._robot),
-                parameters=self._layout.size,
-            )
-        walks = tuple(self._walk(setup, coding, log=log) for setup in setups)
-        rounds = sum(setup.ticks for setup in setups)
-        return WalkResults(walks, LaneUse(rounds, rounds))
-
-    def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
-        step = _Stepper(self._robot, setup, self._soles)
-        n_joints = setup.desired.shape[1]
-        past, sensors, sensed = Past.of(n_joints), Sensors(setup.sensors), np.zeros(n_joints)
-        inner = InnerLoop(self._robot, setup, coding)
-        sums, peaks = np.zeros(len(INTEGRANDS)), np.zeros(len(PEAKS))
-        lifted, clearance = np.zeros(len(self._robot.legs)), math.inf
-        rows: list[Floats] = []
-        status = Status.OK
-        for tick, desired in enumerate(setup.desired):
-            if tick % _TICKS_PER_POLL == 0 and self._should_stop():
-                raise WalkStopped
-            error, load = coded(*sensors.read(step.encoders(), sensed), desired, coding)
-            counts = control(setup.control_law, coding, error, load, past)
-            inner.begin(tick, counts)
-            duty = inner.command(*step.motors())
-            if log:
-                rows.append(np.concatenate([step.q, step.v, step.internal_state, sensed, duty]))
-            begin, end = setup.shove_ticks
-            disturbance = None if setup.disturbance is None else setup.disturbance[tick]
-            rate = self._landing_rate if step.landing(_HORIZON) else self._rate
-            substeps = round(CONTROL_PERIOD * rate)
-            share = coding.substeps / substeps
-            smoothing = _smoothing(setup.current_smoothing, share)
-            step.refine(1.0 / rate)
-            for walked in range(substeps):
-                if walked and walked % (substeps // coding.inner_ticks) == 0:
-                    duty = inner.command(*step.motors())
-                integrands, current = step.step(duty, disturbance, shoved=begin <= tick < end)
-                sensed = low_pass(sensed, current, smoothing)
-                sums += share * integrands
-                peaks, lifted = np.maximum(peaks, step.peaks), np.maximum(lifted, step.heights)
-                if step.diverged:
-                    break
-            if step.diverged:
-                status = Status.DIVERGED
-                break
-            if (tick + 1) % setup.cycle == 0:
-                clearance, lifted = min(clearance, float(lifted.min())), np.zeros_like(lifted)
-            status = status_of(step.q, step.v, step.internal_state, setup, step.knees)
-            if status is not Status.OK:
-                break
-        states = padded_states(rows, setup.ticks) if log else None
-        return WalkResult(status, sums, step.q, peaks, clearance, states)
+    def _physics(self, setup: WalkSetup, coding: Coding) -> _Stepper:
+        rates, should_stop = self._rates, self._should_stop
+        return _Stepper(self._robot, setup, coding, self._soles, rates, should_stop)
 
 
 class _Stepper:
     """MuJoCo's state of one walk, with gears and ground."""
 
-    def __init__(self, robot: Robot, setup: WalkSetup, soles: Soles) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        setup: WalkSetup,
+        coding: Coding,
+        soles: Soles,
+        step_rates: tuple[int, int],
+        should_stop: Callable[[], bool],
+    ) -> None:
+        self._setup, self._coding = setup, coding
+        self._step_rates, self._should_stop = step_rates, should_stop
         self._numbers = numbers = Layout(robot).fields(setup.parameters)
         self._pushed = soles == "none"
         self._m = m = _model(robot, setup, soles)
@@ -190,35 +119,18 @@ class _Stepper:
         self.peaks, self.heights = np.zeros(len(PEAKS)), np.zeros(len(feet))
         self._jammed = bool(numbers["jam_stiffness"].any())
 
-    @property
-    def q(self) -> Floats:
-        """Positions in the kernel's convention: quaternion x y z w."""
-        qpos = self._d.qpos
-        return np.concatenate([qpos[:3], qpos[4:7], qpos[3:4], qpos[7:]])
-
-    @property
-    def v(self) -> Floats:
-        """Velocities in the kernel's convention: the base's twist in its own frame."""
-        qvel = self._d.qvel
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """In the kernel's convention: quaternion x y z w, the body's twist in its own frame."""
+        qpos, qvel, gears = self._d.qpos, self._d.qvel, self._gears
         attitude = np.empty(9)
-        mujoco.mju_quat2Mat(attitude, self._d.qpos[3:7])
-        return np.concatenate([attitude.reshape(3, 3).T @ qvel[:3], qvel[3:]])
+        mujoco.mju_quat2Mat(attitude, qpos[3:7])
+        return (
+            np.concatenate([qpos[:3], qpos[4:7], qpos[3:4], qpos[7:]]),
+            np.concatenate([attitude.reshape(3, 3).T @ qvel[:3], qvel[3:]]),
+            np.concatenate([*gears.memory, *gears.dry.memory, self._ground.memory.ravel()]),
+        )
 
-    @property
-    def internal_state(self) -> Floats:
-        """Rotors, dry friction, then the ground's memory."""
-        gears = self._gears
-        return np.concatenate([*gears.memory, *gears.dry.memory, self._ground.memory.ravel()])
-
-    def landing(self, time: float) -> bool:
-        """Whether a foot may touch down within a time [s]."""
-        self._derive()
-        position, velocity, _ = self._on_ground()
-        return self._ground.landing(position, velocity, time)
-
-    @property
     def knees(self) -> Floats:
-        """Places of the tibias' joints in the world, (L, 3) [m]."""
         return np.asarray(self._d.xpos[self._feet])
 
     def _on_ground(self) -> tuple[Floats, Floats, Floats | None]:
@@ -231,32 +143,40 @@ class _Stepper:
         above[:, :2], above[:, 2] = 0.0, (position[:, 2] - heights) * axes[:, 2, 2]
         return above, np.einsum("lij,lj->li", axes, velocity), axes
 
-    def refine(self, timestep: float) -> None:
-        """Set the length of the following steps [s]."""
-        self._m.opt.timestep = timestep
-
-    def encoders(self) -> Floats:
-        """Angles seen by the encoders, (J,) [rad]."""
-        return self._gears.encoders(self._angles).copy()
-
     def motors(self) -> tuple[Floats, Floats]:
-        """Angles [rad] and rates [rad/s] seen by the encoders, (J,) each."""
         rotors = self._gears.memory
         return (rotors[0], rotors[1]) if rotors else (self._angles, self._rates)
 
-    def step(
-        self, duty: Floats, disturbance: Floats | None, *, shoved: bool
-    ) -> tuple[Floats, Floats]:
-        """Step once; return `INTEGRANDS` and absolute currents (J,) [A] at the step's beginning."""
+    def begin(self, tick: int) -> tuple[int, float]:
+        if tick % _TICKS_PER_POLL == 0 and self._should_stop():
+            raise WalkStopped
+        setup = self._setup
+        self._disturbance = None if setup.disturbance is None else setup.disturbance[tick]
+        begin, end = setup.shove_ticks
+        self._shoved = begin <= tick < end
+        self._derive()
+        position, velocity, _ = self._on_ground()
+        rate = self._step_rates[self._ground.landing(position, velocity, _HORIZON)]
+        self._m.opt.timestep = 1.0 / rate
+        steps = round(CONTROL_PERIOD * rate)
+        self._share = self._coding.substeps / steps
+        smoothing = setup.current_smoothing
+        if smoothing < 1.0:
+            smoothing = -math.expm1(self._share * math.log1p(-smoothing))
+        return steps, smoothing
+
+    def step(self, duty: Floats) -> tuple[Floats, Floats]:
+        """Step once, measuring at the step's beginning."""
         m, d, numbers, timestep = self._m, self._d, self._numbers, self._m.opt.timestep
         self._derive()
         angles, rates, applied = self._angles, self._rates, self._applied
+        disturbance = self._disturbance
         displaced = 0.0 if disturbance is None or not self._displaced else disturbance
         actuation = self._gears.actuate(duty, angles, rates, displaced)
         torque = actuation.torque
         if disturbance is not None and not self._displaced:
             torque = torque + disturbance
-        applied[:3] = numbers["push"] if shoved else 0.0
+        applied[:3] = numbers["push"] if self._shoved else 0.0
         applied[3:6] = 0.0
         applied[6:] = torque
         if self._jammed:
@@ -310,7 +230,7 @@ class _Stepper:
             ]
         )
         self.peaks = np.array([current.max(), strains.max(), abs(roll / level), abs(pitch)])
-        return integrands, current
+        return self._share * integrands, current
 
     def _derive(self) -> None:
         """mj_step1 without its checks, which would write to a file of the user."""
@@ -399,8 +319,3 @@ def _surroundings(robot: Robot, numbers: Mapping[str, Floats]) -> Surroundings:
         for leg, contact in enumerate(robot.contacts())
     )
     return Surroundings(body, numbers["gravity"], contacts)
-
-
-def _smoothing(smoothing: float, share: float) -> float:
-    """The analog low-pass over a share of the step."""
-    return smoothing if smoothing >= 1.0 else -math.expm1(share * math.log1p(-smoothing))

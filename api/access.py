@@ -1,4 +1,4 @@
-"""Authentication and authorization: tokens of requests, and the permissions of their scopes."""
+"""Authentication and authorization: tokens of requests, permissions of their scopes, sessions."""
 
 from __future__ import annotations
 
@@ -14,17 +14,26 @@ from ipaddress import IPv6Address, ip_address
 from typing import TYPE_CHECKING, Annotated, Final, cast
 
 from anyio.to_thread import run_sync
-from fastapi import Depends, Request, Response
+from fastapi import APIRouter, Depends, Request, Response, status
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gaitswarm.api.dependencies import ExistingJob, JobId, ServerSettings, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.api.events import Revocation
+from gaitswarm.api.page import HasManual
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token
-from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
+from gaitswarm.services.optimizer.errors import (
+    Forbidden,
+    StoreUnavailable,
+    TooManyRequests,
+    Unauthorized,
+)
 from gaitswarm.services.optimizer.jobs.job import DEFAULT_PRIORITY, Quota
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.views.base import PREFIX
 
 if TYPE_CHECKING:
@@ -138,7 +147,6 @@ class TokenGuesses:
         return max(0.0, debt - (GUESS_BURST - 1) / GUESSES_PER_SECOND)
 
     def count(self, address: str) -> None:
-        """Count an invalid token."""
         now = self._clock()
         with self._lock:
             recovered = max(now, self._recovered.pop(address, now))
@@ -219,7 +227,6 @@ async def _never() -> None:
 
 
 def secret_of(headers: Headers) -> str | None:
-    """Return the token's secret of a request."""
     scheme, _, credentials = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":
         return credentials.strip()
@@ -289,7 +296,6 @@ Owner = Annotated[str | None, Depends(may_submit)]
 
 
 async def may_administer(token: RequestToken) -> None:
-    """Require scope `admin`."""
     if token is not None and not token.scope.allows(TokenScope.ADMIN):
         raise Forbidden(
             f"the token {token.name!r} has scope `{token.scope}`; use one of scope `admin`"
@@ -302,7 +308,6 @@ def may_restore(job_id: JobId, service: Service, token: RequestToken) -> None:
 
 
 def may_command(job: ExistingJob, token: RequestToken) -> None:
-    """Require the permission to command the job of the path."""
     if token is not None and not token.may_command(job.owner):
         owner = "no owner" if job.owner is None else f"owner {job.owner!r}"
         raise Forbidden(
@@ -332,3 +337,113 @@ def check_may_prioritize(token: Token | None, priority: int) -> None:
             f"the token {token.name!r} of scope `{token.scope}` may not set a priority above"
             f" {DEFAULT_PRIORITY}; use one of scope `admin`"
         )
+
+
+router = APIRouter(prefix=PREFIX, tags=["operations"])
+
+_FOR_PAGE: Final = {"x-used-by": "page"}
+
+_COOKIE_SECONDS: Final = 30 * 24 * 3600
+
+
+class SessionRequest(BaseModel):
+    """Token of a new session."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    token: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="Secret of a token, as printed by `gaitswarm token create`.",
+        examples=["gaitswarm_3q2-7wAAAA"],
+    )
+
+
+class SessionView(View):
+    """Token of the session, and features of the server."""
+
+    required: bool = Field(description="Whether this server requires a token.")
+    name: str | None = Field(
+        description="Name of the request's token; null without a valid one.",
+        examples=["ci"],
+    )
+    scope: TokenScope | None = Field(description="Scope of that token; null without one.")
+    manual: bool = Field(description="Whether this server has a manual at /manual.")
+
+
+@router.get(
+    "/session",
+    operation_id="get_session",
+    openapi_extra=_FOR_PAGE,
+    summary="Get the session",
+    responses=problems(429, guarded=False),
+)
+def get_session(
+    request: Request, service: Service, settings: ServerSettings, manual: HasManual
+) -> SessionView:
+    """Return the session, with or without a token, so that a page knows whether to ask for one.
+
+    For the web page; it may change with the page.
+    """
+    secret = secret_of(request.headers)
+    token = None if secret is None else find_token(request, service.store.tokens, secret)
+    return _view(token, required=settings.tokens_required, manual=manual)
+
+
+@router.post(
+    "/session",
+    operation_id="begin_session",
+    openapi_extra=_FOR_PAGE,
+    summary="Begin a session",
+    response_description="The response sets a cookie that scripts cannot read.",
+    responses=problems(400, 401, 413, 422, 429, guarded=False),
+)
+def begin_session(
+    request: Request,
+    body: SessionRequest,
+    service: Service,
+    settings: ServerSettings,
+    manual: HasManual,
+    response: Response,
+) -> SessionView:
+    """Store a token in a cookie, for browsers; programs send `Authorization`.
+
+    For the web page; it may change with the page.
+    """
+    token = find_token(request, service.store.tokens, body.token)
+    if token is None:
+        raise Unauthorized(UNKNOWN)
+    response.set_cookie(
+        COOKIE,
+        body.token,
+        max_age=_COOKIE_SECONDS,
+        path="/",
+        httponly=True,
+        samesite="strict",
+        # Also behind a TLS proxy, which sets X-Forwarded-Proto.
+        secure=request.url.scheme == "https",
+    )
+    return _view(token, required=settings.tokens_required, manual=manual)
+
+
+@router.delete(
+    "/session",
+    operation_id="end_session",
+    openapi_extra=_FOR_PAGE,
+    summary="End the session",
+    status_code=status.HTTP_204_NO_CONTENT,
+    responses=problems(429, guarded=False),
+)
+def end_session(response: Response) -> None:
+    """Delete the cookie; the token stays valid.
+
+    For the web page; it may change with the page.
+    """
+    response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
+
+
+def _view(token: Token | None, *, required: bool, manual: bool) -> SessionView:
+    return SessionView(
+        required=required,
+        name=None if token is None else token.name,
+        scope=None if token is None else token.scope,
+        manual=manual,
+    )

@@ -73,8 +73,6 @@ def lifespan(
     metrics: Metrics,
     activity: Activity | None = None,
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
-    """Return the lifespan of an application."""
-
     @asynccontextmanager
     async def run(_app: FastAPI) -> AsyncIterator[State]:
         topics, stopping = Topics(), asyncio.Event()
@@ -97,7 +95,6 @@ def lifespan(
 
 
 async def service(request: Request) -> JobService:
-    """Return the application's service."""
     return cast(JobService, request.app.state.service)
 
 
@@ -121,7 +118,6 @@ JobId = Annotated[JobIdText, Path(description="Id of the job, as POST /v1/jobs r
 
 
 def existing_job(job_id: JobId, service: Service) -> Job:
-    """Return the job of the path."""
     return service.job(job_id)
 
 

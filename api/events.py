@@ -98,7 +98,6 @@ class News:
 
     @cached_property
     def events(self) -> tuple[bytes, ...]:
-        """Encoded events `iteration`, one for each iteration."""
         views = map(IterationView.model_validate, self.iterations)
         return tuple(
             format_sse_event(event="iteration", id=str(view.index), data_str=view.model_dump_json())
@@ -107,7 +106,6 @@ class News:
 
     @cached_property
     def state(self) -> bytes:
-        """The encoded event `state`."""
         text = StateView.from_job(self.job).model_dump_json()
         return format_sse_event(event="state", data_str=text)
 
@@ -131,7 +129,6 @@ class Topic:
         self._watch.enter_context(changes.watch(job_id, self._wake, poll_seconds=poll_seconds))
 
     def close(self) -> None:
-        """Stop watching the job."""
         self._timer.cancel()
         self._watch.close()
 
@@ -185,7 +182,6 @@ class Topics:
 
     @contextmanager
     def follow(self, service: JobService, job_id: str, *, poll_seconds: float) -> Iterator[Topic]:
-        """Follow a job inside the block."""
         # A topic keeps its service alive, so the id is unique.
         key = (id(service), job_id)
         topic = self._topics.get(key)
@@ -270,7 +266,7 @@ async def job_events(
     sent_state: tuple[JobState, str | None] | None = None
     version: int | None = None
     left = LARGEST_INDEX if query.limit is None else query.limit
-    with followed as topic, metrics.open_stream() as stream:
+    with followed as topic, metrics.open_stream() as observe_commit:
         while not stopping.is_set():
             try:
                 news = await topic.news(after, known=version)
@@ -290,7 +286,7 @@ async def job_events(
             left -= len(sent)
             for iteration in sent:
                 after = iteration.index
-                stream.sent(iteration.committed_at)
+                observe_commit(iteration.committed_at)
             caught_up = left > 0 and len(news.iterations) < PAGE
             job = news.job
             if caught_up and (job.state, job.waiting) != sent_state:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Literal
 
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -23,6 +23,9 @@ _log = logging.getLogger("gaitswarm.api")
 router = APIRouter(prefix=PREFIX, tags=["operations"])
 
 
+Status = Literal["ok", "degraded", "failed"]
+
+
 class HealthView(View):
     """The server is alive."""
 
@@ -37,7 +40,7 @@ class ComponentView(View):
         " `workers` run their simulations.",
         examples=["runner"],
     )
-    status: Literal["ok", "degraded", "failed"] = Field(
+    status: Status = Field(
         description="`degraded`: a problem that the server tolerates for a while.",
         examples=["ok"],
     )
@@ -101,21 +104,16 @@ def _components(service: JobService, request: Request) -> Iterator[ComponentView
         yield ComponentView(name="database", status="ok")
     for component in request.state.components:
         trouble = component.trouble()
-        if trouble is None:
-            yield ComponentView(name=component.name, status="ok")
-        else:
-            status: Literal["failed", "degraded"] = "failed" if component.vital else "degraded"
-            yield ComponentView(name=component.name, status=status, detail=trouble)
+        status: Status = "ok" if trouble is None else "failed" if component.vital else "degraded"
+        yield ComponentView(name=component.name, status=status, detail=trouble or "")
 
 
 def add_short_paths(app: FastAPI) -> None:
     """Redirect the usual paths of probes, /healthz and /readyz."""
-    for path in ("/healthz", "/readyz"):
-        app.add_route(path, _redirection(f"{PREFIX}{path}"), include_in_schema=False)
 
-
-def _redirection(target: str) -> Callable[[Request], Response]:
     def redirect(request: Request) -> Response:
-        return RedirectResponse(request.scope.get("root_path", "") + target)
+        root = request.scope.get("root_path", "")
+        return RedirectResponse(f"{root}{PREFIX}{request.url.path.removeprefix(root)}")
 
-    return redirect
+    for path in ("/healthz", "/readyz"):
+        app.add_route(path, redirect, include_in_schema=False)

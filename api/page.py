@@ -25,7 +25,7 @@ MANUAL_FOLDER: Final = Path(__file__).parent / "manual"
 PAGES: Final = ("/jobs", "/compare", "/walk", "/controller")
 """Paths of the page's views, each with all paths below it."""
 
-_JOB_PAGE: Final = re.compile(r"/jobs/([a-z0-9]{12})")
+_JOB_PAGE: Final = re.compile(r"/jobs/[a-z0-9]{12}")
 
 _NO_PAGE: Final = "the page is not built; run `make page`, or see /docs for the API"
 
@@ -43,7 +43,6 @@ _NO_MANUAL: Final = (
 
 
 def is_built(folder: Path = PAGE_FOLDER) -> bool:
-    """Return whether the page is built."""
     return (folder / "index.html").is_file()
 
 
@@ -54,9 +53,12 @@ def add_page(app: FastAPI, folder: Path) -> None:
         try:
             text = (folder / "index.html").read_text(encoding="utf-8")
         except FileNotFoundError:
-            instead = _without_page(request)
-            if instead is not None:
-                return RedirectResponse(instead)
+            root = request.scope.get("root_path", "")
+            path = request.url.path.removeprefix(root)
+            if path == "/":
+                return RedirectResponse(f"{root}/docs")
+            if _JOB_PAGE.fullmatch(path):
+                return RedirectResponse(f"{root}{PREFIX}{path}")
             return problem(request.url.path, "not-found", _NO_PAGE)
         # It names assets that a newer build no longer has.
         return HTMLResponse(text, headers=_NO_CACHE)
@@ -99,18 +101,7 @@ def _file(folder: Path, name: str) -> Path | None:
         return None
 
 
-def _without_page(request: Request) -> str | None:
-    """Return the path of the API that replaces a path of the page, if any."""
-    root = request.scope.get("root_path", "")
-    path = request.url.path.removeprefix(root)
-    if path == "/":
-        return f"{root}/docs"
-    job = _JOB_PAGE.fullmatch(path)
-    return f"{root}{PREFIX}/jobs/{job[1]}" if job else None
-
-
 def add_manual(app: FastAPI, folder: Path) -> None:
-    """Serve the manual."""
     app.state.manual_folder = folder
 
     def page(request: Request) -> Response:

@@ -13,21 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from gaitswarm.services.optimizer.errors import (
-    Conflict,
-    EvaluatorUnavailable,
-    Forbidden,
-    GaitswarmError,
-    IdempotencyConflict,
-    InvalidRequest,
-    LeaseLost,
-    NotFound,
-    QuotaExceeded,
-    StoreUnavailable,
-    TooManyRequests,
-    Unauthorized,
-    Unreadable,
-)
+from gaitswarm.services.optimizer import errors as domain
 from gaitswarm.sim.errors import SimulationError, SimulationInputError
 from gaitswarm.sim.robot.bounds import shortened
 from gaitswarm.views.base import FieldErrorView, ProblemView, field_errors
@@ -70,23 +56,23 @@ PROBLEMS: Final[dict[str, tuple[int, str]]] = {
 """Status and title of every problem type, by the last part of its URN."""
 
 _KINDS: Final[tuple[tuple[type[Exception], str], ...]] = (
-    (InvalidRequest, "invalid-request"),
-    (NotFound, "not-found"),
-    (Unauthorized, "unauthorized"),
-    (Forbidden, "forbidden"),
-    (IdempotencyConflict, "idempotency-conflict"),
-    (QuotaExceeded, "quota-exceeded"),
-    (Unreadable, "unreadable"),
-    (Conflict, "conflict"),
-    (LeaseLost, "conflict"),
-    (StoreUnavailable, "unavailable"),
-    (EvaluatorUnavailable, "unavailable"),
+    (domain.InvalidRequest, "invalid-request"),
+    (domain.NotFound, "not-found"),
+    (domain.Unauthorized, "unauthorized"),
+    (domain.Forbidden, "forbidden"),
+    (domain.IdempotencyConflict, "idempotency-conflict"),
+    (domain.QuotaExceeded, "quota-exceeded"),
+    (domain.Unreadable, "unreadable"),
+    (domain.Conflict, "conflict"),
+    (domain.LeaseLost, "conflict"),
+    (domain.StoreUnavailable, "unavailable"),
+    (domain.EvaluatorUnavailable, "unavailable"),
     (SimulationInputError, "invalid-request"),
     (SimulationError, "unavailable"),
 )
 """Types of domain errors, subclasses first."""
 
-DOMAIN_ERRORS: Final = (GaitswarmError, SimulationError)
+DOMAIN_ERRORS: Final = (domain.GaitswarmError, SimulationError)
 """Errors that `domain_problem` handles."""
 
 _HTTP: Final = {
@@ -110,7 +96,6 @@ def problem(
     errors: Sequence[FieldErrorView] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """Return a problem."""
     code, title = PROBLEMS.get(kind) or (status or 500, HTTPStatus(status or 500).phrase)
     view = ProblemView(
         type=f"urn:gaitswarm:problem:{kind}",
@@ -168,22 +153,17 @@ def add_problem_handlers(app: FastAPI) -> None:
         app.add_exception_handler(raised, domain_problem)
 
 
-def _client_text(error: Exception) -> str:
-    """Return an error's text for clients, without that of a database driver."""
-    return error.for_clients if isinstance(error, StoreUnavailable) else str(error)
-
-
 async def domain_problem(request: Request, error: Exception) -> Response:
-    """Return the problem of a domain error."""
-    if isinstance(error, TooManyRequests):
+    if isinstance(error, domain.TooManyRequests):
         return too_many_requests(request.url.path, error.retry_after, str(error))
     name = next((kind for raised, kind in _KINDS if isinstance(error, raised)), None)
     if name is None:
         raise error
     status, _ = PROBLEMS[name]
-    detail = _client_text(error)
+    # Without the text of a database driver.
+    detail = error.for_clients if isinstance(error, domain.StoreUnavailable) else str(error)
     errors = []
-    if isinstance(error, InvalidRequest | QuotaExceeded):
+    if isinstance(error, domain.InvalidRequest | domain.QuotaExceeded):
         message = detail.removeprefix(f"{error.field}: ")
         errors = [_short(FieldErrorView(field=error.field, message=message))]
     elif isinstance(error, SimulationInputError):

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
-from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
@@ -48,7 +47,6 @@ def open_evaluator(
     should_stop: Callable[[], bool] = lambda: False,
     lasting: bool = False,
 ) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
-    """Create the evaluator of a kind."""
     from gaitswarm.services.worker.dispatch import InProcessEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
 
@@ -90,7 +88,6 @@ class AutoEvaluator:
 
     @property
     def place(self) -> str:
-        """Place of the last evaluation."""
         return self._used.place
 
     @property
@@ -204,9 +201,7 @@ def open_runtime(
         store = open_store(database)
         stack.callback(store.close)
         if metrics is not None:
-            from gaitswarm.services.monitoring.metrics import StoreMetrics  # noqa: PLC0415
-
-            store.observers.append(StoreMetrics(metrics))
+            store.observers.append(metrics)
         if webhook_hosts:
             from gaitswarm.services.monitoring.webhooks import Notifier  # noqa: PLC0415
 
@@ -220,6 +215,8 @@ def open_runtime(
             longest_reference=longest_reference,
         )
         if housekeeping:
+            from gaitswarm.services.optimizer.store.maintenance import Housekeeping  # noqa: PLC0415
+
             housekeeper = Housekeeping(store, retention_days, audit_days)
             housekeeper.start()
             stack.callback(housekeeper.stop)

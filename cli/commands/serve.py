@@ -101,9 +101,8 @@ def serve(
     options: RunnerOptions,
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
-    from gaitswarm.api.app import create_app
+    from gaitswarm.api.app import ApiServer, create_app
     from gaitswarm.api.page import is_built
-    from gaitswarm.api.server import ApiServer
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
@@ -170,7 +169,7 @@ def runner(options: RunnerOptions) -> None:
     ):
         log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
         if metrics is not None and opened.runner is not None:
-            from gaitswarm.api.server import metrics_server
+            from gaitswarm.api.app import metrics_server
 
             tokens, trouble = lambda: opened.service.store.tokens, opened.runner.trouble
             url = stack.enter_context(metrics_server(metrics, tokens, settings, trouble))

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
     from gaitswarm.services.worker.dispatch import Load
 
+_NAMESPACE: Final = "gaitswarm"
+
 _OTHER: Final = "other"
 
 _CAUSES: Final = (
@@ -53,109 +55,142 @@ _HTTP_BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0,
 _LAG_BUCKETS: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0)
 _ITERATION_BUCKETS: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0, 1800.0)
 
+_REMEMBERED_LOSSES: Final = 256
+"""Lost leases remembered, so that each is counted once."""
+
 
 class Metrics:
-    """Counters, gauges and histograms of this process. Thread-safe."""
+    """Counters, gauges and histograms of this process, and an `Observer` of stores. Thread-safe."""
 
     def __init__(self) -> None:
         # Creation times would double the number of series.
         disable_created_metrics()  # type: ignore[no-untyped-call]
+        self._lost: dict[tuple[str, int], None] = {}
+        self._lock = threading.Lock()
         self.registry = CollectorRegistry(auto_describe=False)
-        registry = self.registry
-        counter = partial(Counter, registry=registry)
-        histogram = partial(Histogram, registry=registry)
-        ProcessCollector(registry=registry)
-        Gauge(
-            "gaitswarm_build_info",
-            "1, with the version of gaitswarm as a label",
-            ["version"],
-            registry=registry,
-        ).labels(installed_version()).set(1)
-        self.iterations = counter(
-            "gaitswarm_iterations_committed_total", "Committed iterations", ["kind"]
-        )
+        counter = partial(Counter, namespace=_NAMESPACE, registry=self.registry)
+        gauge = partial(Gauge, namespace=_NAMESPACE, registry=self.registry)
+        histogram = partial(Histogram, namespace=_NAMESPACE, registry=self.registry)
+        ProcessCollector(registry=self.registry)
+        version = gauge("build_info", "1, with the version of gaitswarm as a label", ["version"])
+        version.labels(installed_version()).set(1)
+        self.iterations = counter("iterations_committed_total", "Committed iterations", ["kind"])
         self.iteration_seconds = histogram(
-            "gaitswarm_iteration_evaluation_seconds",
+            "iteration_evaluation_seconds",
             "Duration of the evaluation of a committed iteration",
             buckets=_ITERATION_BUCKETS,
         )
-        self.walks = counter(
-            "gaitswarm_walks_total",
-            "Simulations run for committed iterations, by status",
-            ["status"],
-        )
+        text = "Simulations run for committed iterations, by status"
+        self.walks = counter("walks_total", text, ["status"])
         for status in Status:
             # A series that starts with 0 has a rate from its first increment.
             self.walks.labels(status.label)
         self.simulated_seconds = counter(
-            "gaitswarm_simulated_seconds_total", "Simulated time of committed iterations"
+            "simulated_seconds_total", "Simulated time of committed iterations"
         )
-        self.jobs_ended = counter(
-            "gaitswarm_jobs_ended_total", "Jobs that ended", ["state", "kind"]
-        )
-        self.job_failures = counter("gaitswarm_job_failures_total", "Jobs that failed", ["cause"])
+        self.jobs_ended = counter("jobs_ended_total", "Jobs that ended", ["state", "kind"])
+        self.job_failures = counter("job_failures_total", "Jobs that failed", ["cause"])
         for cause in FAILURE_CAUSES:
             self.job_failures.labels(cause)
         self.lease_losses = counter(
-            "gaitswarm_lease_losses_total", "Leases that another runner took over from this process"
+            "lease_losses_total", "Leases that another runner took over from this process"
         )
         self.lease_takeovers = counter(
-            "gaitswarm_lease_takeovers_total",
+            "lease_takeovers_total",
             "Jobs that this process took over from a runner with an expired lease",
         )
         self.database_seconds = histogram(
-            "gaitswarm_database_operation_duration_seconds",
+            "database_operation_duration_seconds",
             "Duration of a store operation, with all its statements",
             ["operation"],
             buckets=_DATABASE_BUCKETS,
         )
         self.database_errors = counter(
-            "gaitswarm_database_errors_total",
+            "database_errors_total",
             "Store operations that found the database unavailable",
             ["operation"],
         )
-        self.streams = Gauge("gaitswarm_event_streams", "Open event streams", registry=registry)
+        self.streams = gauge("event_streams", "Open event streams")
         self.stream_lag = histogram(
-            "gaitswarm_event_stream_lag_seconds",
+            "event_stream_lag_seconds",
             "Time from the commit of an iteration to its event, on streams open at the commit",
             buckets=_LAG_BUCKETS,
         )
         self.http_requests = counter(
-            "gaitswarm_http_requests_total", "Answered requests", ["method", "route", "status"]
+            "http_requests_total", "Answered requests", ["method", "route", "status"]
         )
         self.http_seconds = histogram(
-            "gaitswarm_http_request_duration_seconds",
+            "http_request_duration_seconds",
             "Time from a request to the start of its response",
             ["method", "route"],
             buckets=_HTTP_BUCKETS,
         )
 
     @contextmanager
-    def open_stream(self) -> Iterator[OpenStream]:
-        """Count an event stream as open inside the block."""
-        self.streams.inc()
-        try:
-            yield OpenStream(self.stream_lag, datetime.now(UTC))
-        finally:
-            self.streams.dec()
+    def open_stream(self) -> Iterator[Callable[[datetime], None]]:
+        """Count an event stream as open inside the block; yield the observer of its events."""
+        opened = datetime.now(UTC)
+
+        def sent(committed_at: datetime) -> None:
+            """Record an iteration's event, unless it was committed before the stream was opened."""
+            if committed_at >= opened:
+                self.stream_lag.observe(
+                    max(0.0, (datetime.now(UTC) - committed_at).total_seconds())
+                )
+
+        with self.streams.track_inprogress():
+            yield sent
 
     def exposition(self, accept: str) -> tuple[bytes, str]:
         """Return all metrics in the requested format, and its media type."""
         encode, media_type = choose_encoder(accept)
         return encode(self.registry), media_type
 
+    def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:
+        self.database_seconds.labels(operation).observe(seconds)
+        if isinstance(error, StoreUnavailable):
+            self.database_errors.labels(operation).inc()
 
-class OpenStream:
-    """An open event stream; see `Metrics.open_stream`."""
+    def claimed(self, claim: Claim) -> None:
+        if claim.taken_from is not None:
+            self.lease_takeovers.inc()
 
-    def __init__(self, lag: Histogram, opened: datetime) -> None:
-        self._lag = lag
-        self._opened = opened
+    def committed(self, claim: Claim, done: CompletedIteration, state: JobState) -> None:
+        spec = claim.job.spec
+        self.iterations.labels(spec.kind).inc()
+        self.iteration_seconds.observe(done.evaluate_seconds)
+        walked = np.array([key is not None for key in done.keys] or [True] * len(done.fitness))
+        statuses = np.concatenate([outcome.statuses[walked] for outcome in done.outcomes])
+        designs = int(walked.sum())
+        if done.reevaluation is not None:
+            statuses = np.concatenate([statuses, np.ravel(done.reevaluation.statuses)])
+            designs += 1
+        values, counts = np.unique(statuses, return_counts=True)
+        for value, count in zip(values.tolist(), counts.tolist(), strict=True):
+            self.walks.labels(Status(value).label).inc(count)
+        seconds = duration(spec, spec.cases(claim.recordings))
+        self.simulated_seconds.inc(designs * seconds)
+        if state.terminal:
+            self.jobs_ended.labels(state, spec.kind).inc()
 
-    def sent(self, committed_at: datetime) -> None:
-        """Record an iteration's event, unless it was committed before the stream was opened."""
-        if committed_at >= self._opened:
-            self._lag.observe(max(0.0, (datetime.now(UTC) - committed_at).total_seconds()))
+    def released(self, claim: Claim, state: JobState, error: str | None) -> None:
+        if state is JobState.FAILED:
+            self.jobs_ended.labels(state, claim.job.spec.kind).inc()
+            self.job_failures.labels(failure_cause(error)).inc()
+
+    def lost(self, claim: Claim, error: LeaseLost) -> None:
+        lease = (claim.job.id, claim.token)
+        with self._lock:
+            if not error.taken_over or lease in self._lost:
+                return
+            self._lost[lease] = None
+            if len(self._lost) > _REMEMBERED_LOSSES:
+                del self._lost[next(iter(self._lost))]
+        self.lease_losses.inc()
+
+    def cancelled(self, job: Job) -> None:
+        kind = job.spec.kind if job.readable else "unknown"
+        self.jobs_ended.labels(job.state, kind).inc()
 
 
 def failure_cause(error: str | None) -> str:
@@ -174,7 +209,7 @@ class QueueCollector(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        name, text = "gaitswarm_database_up", "Whether the database answers: 1 or 0"
+        name, text = "database_up", "Whether the database answers: 1 or 0"
         try:
             queue = self._store().queue()
         except StoreUnavailable:
@@ -183,17 +218,17 @@ class QueueCollector(Collector):
         causes = collections.Counter(map(failure_cause, queue.errors))
         yield _gauge(name, text, {(): 1})
         by_state = {(state,): count for state, count in queue.jobs.items()}
-        yield _gauge("gaitswarm_jobs", "Jobs in the database", by_state, "state")
+        yield _gauge("jobs", "Jobs in the database", by_state, "state")
         labels = ("state", "kind")
-        yield _gauge("gaitswarm_queue_jobs", "Jobs that have not ended", queue.under_way, *labels)
+        yield _gauge("queue_jobs", "Jobs that have not ended", queue.under_way, *labels)
         yield _gauge(
-            "gaitswarm_failed_jobs",
+            "failed_jobs",
             "Jobs in the database that have failed",
             {(cause,): causes[cause] for cause in FAILURE_CAUSES},
             "cause",
         )
         yield _gauge(
-            "gaitswarm_queue_longest_wait_seconds",
+            "queue_longest_wait_seconds",
             "Longest time that a queued job has waited for a runner",
             {(): queue.longest_wait},
         )
@@ -201,7 +236,7 @@ class QueueCollector(Collector):
 
 def _gauge(name: str, text: str, samples: Mapping[Any, float], *labels: str) -> GaugeMetricFamily:
     """Return a metric; samples: values by tuples of labels."""
-    metric = GaugeMetricFamily(name, text, labels=labels)
+    metric = GaugeMetricFamily(f"{_NAMESPACE}_{name}", text, labels=labels)
     for values, sample in samples.items():
         metric.add_metric(values, sample)
     return metric
@@ -221,63 +256,4 @@ class WorkersCollector(Collector):
             ("tasks_waiting", "Tasks waiting for a slot", "waiting"),
         ):
             samples = {(worker,): getattr(load, attribute) for worker, load in loads.items()}
-            yield _gauge(f"gaitswarm_worker_{name}", text, samples, "workers")
-
-
-_REMEMBERED_LOSSES: Final = 256
-"""Lost leases remembered, so that each is counted once."""
-
-
-class StoreMetrics:
-    """Measures what this process does with a store."""
-
-    def __init__(self, metrics: Metrics) -> None:
-        self._metrics = metrics
-        self._lost: dict[tuple[str, int], None] = {}
-        self._lock = threading.Lock()
-
-    def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:
-        self._metrics.database_seconds.labels(operation).observe(seconds)
-        if isinstance(error, StoreUnavailable):
-            self._metrics.database_errors.labels(operation).inc()
-
-    def claimed(self, claim: Claim) -> None:
-        if claim.taken_from is not None:
-            self._metrics.lease_takeovers.inc()
-
-    def committed(self, claim: Claim, done: CompletedIteration, state: JobState) -> None:
-        spec = claim.job.spec
-        self._metrics.iterations.labels(spec.kind).inc()
-        self._metrics.iteration_seconds.observe(done.evaluate_seconds)
-        walked = np.array([key is not None for key in done.keys] or [True] * len(done.fitness))
-        statuses = np.concatenate([outcome.statuses[walked] for outcome in done.outcomes])
-        designs = int(walked.sum())
-        if done.reevaluation is not None:
-            statuses = np.concatenate([statuses, np.ravel(done.reevaluation.statuses)])
-            designs += 1
-        values, counts = np.unique(statuses, return_counts=True)
-        for value, count in zip(values.tolist(), counts.tolist(), strict=True):
-            self._metrics.walks.labels(Status(value).label).inc(count)
-        seconds = duration(spec, spec.cases(claim.recordings))
-        self._metrics.simulated_seconds.inc(designs * seconds)
-        if state.terminal:
-            self._metrics.jobs_ended.labels(state, spec.kind).inc()
-
-    def released(self, claim: Claim, state: JobState, error: str | None) -> None:
-        if state is JobState.FAILED:
-            self._metrics.jobs_ended.labels(state, claim.job.spec.kind).inc()
-            self._metrics.job_failures.labels(failure_cause(error)).inc()
-
-    def lost(self, claim: Claim, error: LeaseLost) -> None:
-        lease = (claim.job.id, claim.token)
-        with self._lock:
-            if not error.taken_over or lease in self._lost:
-                return
-            self._lost[lease] = None
-            if len(self._lost) > _REMEMBERED_LOSSES:
-                del self._lost[next(iter(self._lost))]
-        self._metrics.lease_losses.inc()
-
-    def cancelled(self, job: Job) -> None:
-        kind = job.spec.kind if job.readable else "unknown"
-        self._metrics.jobs_ended.labels(job.state, kind).inc()
+            yield _gauge(f"worker_{name}", text, samples, "workers")

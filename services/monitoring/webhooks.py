@@ -45,7 +45,6 @@ _log = logging.getLogger(__name__)
 
 
 def signature(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
-    """Return the signature of a notification."""
     signed = b".".join((message_id.encode(), str(timestamp).encode(), body))
     digest = hmac.new(_key(secret), signed, hashlib.sha256).digest()
     return f"v1,{base64.b64encode(digest).decode()}"

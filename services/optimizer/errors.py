@@ -1,24 +1,4 @@
-"""Errors of the service.
-
-GaitswarmError
-├── InvalidRequest          invalid request; names the field (HTTP 422)
-├── NotFound                no job or iteration with that id (HTTP 404)
-├── Conflict                not possible in the job's current state (HTTP 409)
-│   ├── BudgetChanged       the job was extended after it was claimed
-│   ├── ProvenanceChanged   code or libraries differ from those of the job's earlier results
-│   ├── IdempotencyConflict the key was used before with another body
-│   ├── QuotaExceeded       the owner's quota is exhausted; names the field
-│   └── Unreadable          this version cannot read the stored document
-├── Forbidden               permission denied (HTTP 403)
-│   └── Unauthorized        authentication required, or unknown token (HTTP 401)
-├── LeaseLost               another runner or a cancellation took the job
-├── KilledWorker            a task crashes the workers that run it
-└── Unavailable             temporarily not possible; try again later (HTTP 503)
-    ├── TooManyRequests     too many requests; states when to try again (HTTP 429)
-    ├── EvaluatorUnavailable    the workers cannot be reached
-    └── StoreUnavailable        the database or server cannot be reached, or has another schema
-        └── StoreReplaced       the database file was removed or replaced while open
-"""
+"""Errors of the service; `gaitswarm.api.problems` answers requests with them"""
 
 from __future__ import annotations
 

@@ -25,5 +25,4 @@ def log_context(**fields: str | int | None) -> Iterator[None]:
 
 
 def log_fields() -> Mapping[str, str | int]:
-    """Return the fields of the current context."""
     return _fields.get()

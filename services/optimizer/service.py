@@ -148,7 +148,6 @@ class JobService:
         return self._referenced(started, starts=True)
 
     def _referenced(self, spec: S, *, starts: bool = False) -> S:
-        """Look up the references of constraints."""
         from gaitswarm.services.optimizer.analysis.reference import with_references
 
         longest = self.longest_reference
@@ -202,7 +201,6 @@ class JobService:
         actor: str = LOCAL,
         quota: Quota | None = None,
     ) -> Job:
-        """Change a job's budget."""
         job = self.job(job_id)
         extended = job.spec.with_budget(iterations) if job.readable else None
         seconds = None if extended is None else self._check_length(extended)

@@ -206,8 +206,6 @@ class _Running:
 
 @dataclass(slots=True, eq=False)
 class _Iteration:
-    """A request in progress."""
-
     request: EvaluationRequest
     pending: deque[Chunk]
     outcomes: tuple[Outcome, ...]
@@ -224,7 +222,6 @@ class _Iteration:
         return cls(request, deque(chunks), empty)
 
     def put(self, chunk: Chunk, answer: Answer) -> None:
-        """Copy an answer to its place."""
         if answer.outcomes is None:
             raise unlike(answer.host, answer.refusal)
         count = chunk.stop - chunk.start
@@ -315,7 +312,6 @@ class Dispatcher:
         return iteration.outcomes
 
     def load(self, slots: int) -> Load:
-        """Return the present load of an engine of some slots."""
         with self._lock:
             running = sum(len(each.running) for each in self._active)
             pending = sum(len(each.pending) for each in self._active)

@@ -198,7 +198,6 @@ def _head(ray: ModuleType) -> tuple[str, int]:
 
 
 def listens(host: str, port: int, *, timeout: float = 2.0) -> bool:
-    """Return whether an address accepts connections."""
     try:
         with socket.create_connection((host, port), timeout=timeout):
             return True

@@ -12,10 +12,10 @@ import httpx2
 import pytest
 
 from gaitswarm.services.optimizer.errors import NotFound
-from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.maintenance import Housekeeping
 from tests.api.conftest import Commit
 from tests.examples.processes import eventually
 from tests.examples.servers import ServerProcess
@@ -80,7 +80,7 @@ def test_the_stream_of_a_job_that_is_deleted_ends_with_that(
 def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
     database: Path, spec: JobSpec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaitswarm.services.optimizer.housekeeping._STEADY_SECONDS", -1.0)
+    monkeypatch.setattr("gaitswarm.services.optimizer.store.maintenance._STEADY_SECONDS", -1.0)
     clock = Clock()
     clock.now = datetime.now(UTC) - timedelta(hours=2)
     with closing(open_store(str(database), clock=clock)) as store:
@@ -98,7 +98,7 @@ def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
 def test_housekeeping_removes_a_deleted_job_after_a_day_only(
     database: Path, spec: JobSpec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaitswarm.services.optimizer.housekeeping._STEADY_SECONDS", -1.0)
+    monkeypatch.setattr("gaitswarm.services.optimizer.store.maintenance._STEADY_SECONDS", -1.0)
     clock = Clock()
     with closing(open_store(str(database), clock=clock)) as store:
         job, _ = store.create_job(spec)
@@ -128,7 +128,7 @@ def test_housekeeping_deletes_nothing_until_the_clock_was_steady_for_a_day(
         keeper.round()
         assert [found.id for found in store.jobs().items] == [job.id]
         assert "ahead of the last change" in caplog.text
-        monkeypatch.setattr("gaitswarm.services.optimizer.housekeeping._STEADY_SECONDS", 0.0)
+        monkeypatch.setattr("gaitswarm.services.optimizer.store.maintenance._STEADY_SECONDS", 0.0)
         keeper.round()
         assert store.jobs().items == ()
 

@@ -13,8 +13,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from gaitswarm.api.app import create_app
-from gaitswarm.api.server import ApiServer
+from gaitswarm.api.app import ApiServer, create_app
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
@@ -135,6 +134,6 @@ def test_views_need_no_web_framework_and_the_api_neither_ray_nor_a_database_nor_
     statements = (
         "import gaitswarm.views.job, gaitswarm.services.optimizer.jobs.designs, sys\n"
         "assert not {'fastapi', 'starlette', 'uvicorn'} & set(sys.modules)\n"
-        "import gaitswarm.api.app, gaitswarm.api.server"
+        "import gaitswarm.api.app, gaitswarm.api.app"
     )
     assert loaded_by(statements, ["ray", "sqlalchemy", "alembic", "scipy"]) == set()

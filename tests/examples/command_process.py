@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 for _name in (
     "alembic.command",
     "gaitswarm.api.app",
-    "gaitswarm.api.server",
+    "gaitswarm.api.app",
     "gaitswarm.cli.commands.serve",
     "gaitswarm.cli.embedded",
     "gaitswarm.cli.inputs",

@@ -19,8 +19,7 @@ from fastapi.routing import APIRoute
 from numpy.typing import NDArray
 
 from gaitswarm.api import dependencies
-from gaitswarm.api.app import create_app
-from gaitswarm.api.server import ApiServer
+from gaitswarm.api.app import ApiServer, create_app
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.service import JobService

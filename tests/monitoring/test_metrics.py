@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.services.monitoring.metrics import Metrics, QueueCollector, StoreMetrics
+from gaitswarm.services.monitoring.metrics import Metrics, QueueCollector
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
@@ -152,8 +152,8 @@ def test_the_longest_wait_is_that_of_the_job_queued_first(database: Path) -> Non
 def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -> None:
     clock, loser, winner = Clock(), Metrics(), Metrics()
     slow, quick = (open_store(str(database), clock=clock) for _ in range(2))
-    slow.observers.append(StoreMetrics(loser))
-    quick.observers.append(StoreMetrics(winner))
+    slow.observers.append(loser)
+    quick.observers.append(winner)
     slow.create_job(SPEC)
     late = slow.claim("late", lease_seconds=30.0)
     assert late is not None
@@ -196,7 +196,7 @@ def test_failed_jobs_are_counted_by_cause(
         return provenance
 
     metrics = Metrics()
-    store.observers.append(StoreMetrics(metrics))
+    store.observers.append(metrics)
     store.create_job(SPEC, provenance=HERE)
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
@@ -225,7 +225,7 @@ def test_quarantined_jobs_are_counted_among_the_failed_ones(database: Path) -> N
 def test_operations_without_a_database_are_counted(database: Path) -> None:
     metrics = Metrics()
     with closing(open_store(str(database))) as store:
-        store.observers.append(StoreMetrics(metrics))
+        store.observers.append(metrics)
         store.create_job(SPEC)
         database.unlink()
         with pytest.raises(StoreUnavailable):

@@ -132,7 +132,6 @@ class Outage:
             return is_news
 
     def attempted(self) -> None:
-        """Record the start of an attempt."""
         with self._lock:
             self._attempt_since = self._clock()
 

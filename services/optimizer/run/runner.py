@@ -89,7 +89,6 @@ class Runner:
 
     @property
     def running(self) -> bool:
-        """Whether the scheduler thread is alive."""
         return self._scheduler is not None and self._scheduler.is_alive()
 
     def trouble(self) -> str | None:

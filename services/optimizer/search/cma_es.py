@@ -101,8 +101,6 @@ class DistributionState(BaseModel):
 
 
 class _CmaEsState(GenerationState):
-    """State of a search by distributions."""
-
     restarts: NonNegativeInt
     """Number of distributions before the current one."""
     bests: Fitness
@@ -275,7 +273,6 @@ class NormalDistribution:
         self._scale_rates: Final = self._rates(float(d))
 
     def sample(self, random: RandomNumbers) -> Floats:
-        """Sample a generation."""
         _, y = self._steps(random)
         unit = self.state.mean + self.state.sigma * self.state.scale * y
         designs = self._space.designs(self._space.from_unit(unit))

@@ -207,7 +207,6 @@ class SampledHypervolume:
     """The hypervolume that a front dominates, estimated from random points in its scaled box."""
 
     def __init__(self, front: Floats, samples: int, random: RandomNumbers) -> None:
-        """Draw the points."""
         low = front.min(axis=0)
         span = front.max(axis=0) - low
         scaled = (front - low) / np.where(span > 0.0, span, 1.0)

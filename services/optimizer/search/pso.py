@@ -250,7 +250,6 @@ def random_informants(draws: Floats) -> Links:
 
 
 def leaders(links: Links, fitness: Floats) -> NDArray[np.intp]:
-    """Return the best informant of each particle."""
     informs, informed = links
     worst_first = np.argsort(-fitness[informs], kind="stable")
     best = np.empty(len(fitness), dtype=np.intp)

@@ -25,10 +25,10 @@ from sqlalchemy.exc import (
 )
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
+from gaitswarm.services.optimizer.access import HARMLESS, masked_url
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreReplaced, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
-from gaitswarm.services.optimizer.masking import HARMLESS, masked_url
 
 BUSY_SECONDS: Final = 15.0
 """Longest wait of a transaction for another's lock."""
@@ -105,7 +105,6 @@ class Database:
     """Connections to a database and their transactions. Thread-safe; connects when first used."""
 
     def __init__(self, url: str | sa.URL, *, for_migration: bool = False) -> None:
-        """Prepare connections."""
         self.url = parse_url(url) if isinstance(url, str) else url
         self.observers: list[Observer] = []
         self._file: _OpenFile | None = None
@@ -128,7 +127,6 @@ class Database:
             self.engine = _postgresql_engine(self.url, options, unlimited=for_migration)
 
     def read(self, operation: str = "") -> AbstractContextManager[sa.Connection]:
-        """Open a transaction that reads."""
         return self.transaction(operation, write=False)
 
     def write(self, operation: str = "") -> AbstractContextManager[sa.Connection]:

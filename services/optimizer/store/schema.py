@@ -30,7 +30,6 @@ _alembic_lock: Final = threading.Lock()
 
 
 def head() -> str:
-    """Return the newest revision."""
     return _known_revisions()[-1]
 
 

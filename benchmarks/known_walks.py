@@ -76,8 +76,8 @@ class _Job:
 
     def _next(self, iteration: int) -> Ask:
         space = self._spec.design_space()
-        share = self._random.random((self._spec.optimizer.particles, len(space.low)))
-        return Ask(iteration, space.low + share * (space.high - space.low), {})
+        share = self._random.random((self._spec.optimizer.particles, len(space.box.low)))
+        return Ask(iteration, space.box.low + share * (space.box.high - space.box.low), {})
 
     def _timed(self, name: str, action: Callable[[], T]) -> T:
         begun = time.perf_counter()

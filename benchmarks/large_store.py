@@ -99,7 +99,7 @@ def _step(store: Store, claim: Claim, optimizer: Optimizer, ask: Ask) -> Ask | N
 def optimizer_bounds(job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(low, high) of the searched variables."""
     space = job.spec.design_space()
-    return space.low, space.high
+    return space.box.low, space.box.high
 
 
 def walk(

@@ -54,6 +54,8 @@ from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.labels import JobFacetsView
+from gaitswarm.services.optimizer.jobs.listing import AuditEntryView
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.catalogue import design_numbers
@@ -78,8 +80,7 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.job import JobFacetsView
-from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
+from gaitswarm.views.operations import ActivityView, Level, NotificationView
 
 TableBits = Annotated[str | None, Field(pattern=r"^[0-9]{1,2}x[0-9]{1,2}$", examples=["8x6"])]
 
@@ -447,7 +448,7 @@ class ServedJobs(DatabaseJobs):
         Args:
             archived: True: only archived jobs; false: only others.
         """
-        return JobFacetsView.model_validate(self._service.store.facets(archived=archived))
+        return self._service.store.facets(archived=archived)
 
     @operations(
         "GET /jobs/{job_id}/activity",
@@ -492,5 +493,4 @@ class ServedJobs(DatabaseJobs):
             limit: Maximum number of entries.
         """
         page = self._service.store.audit(job_id=job_id, after=after, limit=limit)
-        items = [AuditEntryView.model_validate(entry) for entry in page.items]
-        return PageView[AuditEntryView](items=items, next=page.next)
+        return PageView[AuditEntryView].model_validate(page)

@@ -229,7 +229,6 @@ def audit(
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.optimizer.store import open_store
     from gaitswarm.settings import read_settings
-    from gaitswarm.views.operations import AuditEntryView
 
     settings = read_settings(db=db or None)
     with closing(open_store(database_to_write(settings))) as store:
@@ -245,7 +244,7 @@ def audit(
                 f" {entry.job_id or '-':12}  {details}".rstrip()
             )
 
-    return map(AuditEntryView.model_validate, entries), parts()
+    return iter(entries), parts()
 
 
 def optimizers() -> Printed:

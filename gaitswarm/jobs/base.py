@@ -56,6 +56,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
+from gaitswarm.services.optimizer.jobs.time_left import EstimateView
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.specs import (
     ConstraintInput,
@@ -70,7 +71,6 @@ from gaitswarm.specs import (
 from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, encoded_table
 from gaitswarm.views.job import (
     BestView,
-    EstimateView,
     HistoryIterationView,
     IterationView,
     JobKind,
@@ -311,7 +311,7 @@ class Jobs(ABC):
             spec: As for `submit`.
             **options: As for `submit`.
         """
-        return EstimateView.model_validate(self._service.estimate(chosen_spec(spec, options)))
+        return self._service.estimate(chosen_spec(spec, options))
 
     @items
     @core("GET /jobs", "list_jobs", "List jobs")

@@ -140,26 +140,6 @@ def budget_spent(
     return Spent(evaluations, evaluations_planned, "designs")
 
 
-class EstimateView(View):
-    """Estimated cost of a job."""
-
-    evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
-    walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
-    simulated_seconds: float = Field(
-        description="Simulated time in total [s]; less for designs that fall.", examples=[20250.0]
-    )
-    seconds: float | None = Field(
-        description="Wall time if it has the machine to itself [s]; null if unknown.",
-        examples=[21.5],
-    )
-    basis: str = Field(
-        description="Basis of the estimate.",
-        examples=[
-            "a simulation measured on this machine, 471 simulated s/s, on all of its 2 cores"
-        ],
-    )
-
-
 JobKind = Literal["tuning", "identification", "calibration", "certificate", "preferences"]
 
 
@@ -436,17 +416,6 @@ def _summary(job: Job) -> dict[str, Any]:
         "eta_basis": rates.basis,
         "links": _links(job),
     }
-
-
-class JobFacetsView(View):
-    """Counts of jobs; those without robot, controller or preference count in the total only."""
-
-    total: int = Field(description="Jobs in all [1].", examples=[1000])
-    states: dict[str, int] = Field(description="By state [1].", examples=[{"succeeded": 12}])
-    robots: dict[str, int] = Field(description="By name of the robot [1].")
-    controllers: dict[str, int] = Field(description="By motor controller [1].")
-    preferences: dict[str, int] = Field(description="By preference, `own` for any other [1].")
-    tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])
 
 
 _COMMANDS: Final = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import Literal
 from urllib.parse import urlsplit
 
 from pydantic import Field
@@ -15,7 +15,6 @@ from gaitswarm.services.monitoring.activity import (
     TaskSpanView,
     WorkerHealthView,
 )
-from gaitswarm.services.optimizer.jobs.listing import AuditAction
 from gaitswarm.services.optimizer.jobs.notification import Notification
 from gaitswarm.services.optimizer.views import JobName, View
 
@@ -57,25 +56,6 @@ class ActivityView(View):
             tasks=list(activity.tasks),
             messages=[message for message in activity.messages if message.level in severe],
         )
-
-
-class AuditEntryView(View):
-    """One entry of the audit log."""
-
-    index: int = Field(description="Index, increasing with time.", examples=[42])
-    at: datetime = Field(description="When, UTC.")
-    actor: str = Field(
-        description="Name of the token; `local` for a client on the machine without one.",
-        examples=["ci"],
-    )
-    action: AuditAction = Field(description="The action.", examples=["cancel"])
-    job_id: str | None = Field(
-        description="The job, which may have been deleted since; null for none.",
-        examples=["k2q7zr5dm9xw"],
-    )
-    details: dict[str, Any] = Field(
-        description="Further content, such as the new budget.", examples=[{"iterations": 50}]
-    )
 
 
 class NotificationView(View):

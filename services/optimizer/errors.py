@@ -120,6 +120,6 @@ def simulation_errors(field: str) -> Iterator[None]:
     try:
         yield
     except SimulationInputError as error:
-        raise InvalidRequest(str(error), field=field) from error
+        raise InvalidRequest(str(error).removeprefix(f"{field}: "), field=field) from error
     except SimulationError as error:
         raise EvaluatorUnavailable(str(error)) from error

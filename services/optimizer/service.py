@@ -37,7 +37,8 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_prov
 from gaitswarm.services.optimizer.jobs.spec import Spec
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.jobs.estimate import Estimate, MeasuredRates
+    from gaitswarm.services.optimizer.jobs.estimate import MeasuredRates
+    from gaitswarm.services.optimizer.jobs.time_left import EstimateView
     from gaitswarm.services.optimizer.store import Store
     from gaitswarm.sim.identification import RecordedWalk
 
@@ -162,7 +163,7 @@ class JobService:
 
         return MeasuredRates()
 
-    def estimate(self, spec: Spec) -> Estimate:
+    def estimate(self, spec: Spec) -> EstimateView:
         """Estimate a job's cost from a measured simulation."""
         from gaitswarm.services.optimizer.jobs.estimate import estimate
 

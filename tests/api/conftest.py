@@ -90,9 +90,9 @@ def commit(store: Store) -> Commit:
 
 
 def _ask(job: Job, index: int) -> Ask:
-    space = job.spec.design_space()
-    share = np.random.default_rng(index).random((PARTICLES, len(space.low)))
-    return Ask(index, space.low + share * (space.high - space.low), {"iteration": index})
+    box = job.spec.design_space().box
+    share = np.random.default_rng(index).random((PARTICLES, len(box.low)))
+    return Ask(index, box.low + share * (box.high - box.low), {"iteration": index})
 
 
 def _completed(job: Job, index: int, *, failed: bool) -> CompletedIteration:

@@ -55,7 +55,7 @@ def test_the_distribution_leaves_out_designs_that_failed(
     assert second["fitness"] == pytest.approx([100, 100.1, 100.5, 101, 101.5, 101.9, 102])
     space = job.spec.design_space()
     designs = np.array([evaluation.design for evaluation in store.evaluations(job.id, 1)])
-    spread = designs.std(axis=0) / (space.high - space.low)
+    spread = designs.std(axis=0) / (space.box.high - space.box.low)
     assert second["diversity"] == pytest.approx(spread.mean())
     assert found["next"] is None
 

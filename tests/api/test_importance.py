@@ -37,10 +37,10 @@ def searched(store: Store) -> Job:
     claim = store.claim("test", lease_seconds=60.0, job_id=job.id)
     assert claim is not None
     space = spec.design_space()
-    share = np.random.default_rng(1).random((DESIGNS, len(space.low)))
+    share = np.random.default_rng(1).random((DESIGNS, len(space.box.low)))
     share[0] = [1.0, 0.5]
     p, i = share.T
-    ask = Ask(0, space.low + share * (space.high - space.low), {})
+    ask = Ask(0, space.box.low + share * (space.box.high - space.box.low), {})
     store.begin(claim, ask)
     objectives = np.full((DESIGNS, len(RESULTS)), 10.0)
     objectives[:, 3] = 50.0 - 10.0 * p

@@ -7,7 +7,7 @@ import numpy as np
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import PLAIN, Aggregation
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from gaitswarm.sim.outcome import Status
 
@@ -18,7 +18,7 @@ def columns_of(
     *,
     particles: int = 1,
     own: Preference = PREFERENCES["A"],
-    aggregation: Aggregation | None = None,
+    aggregation: Aggregation = PLAIN,
 ) -> EvaluationColumns:
     """A job's history.
 

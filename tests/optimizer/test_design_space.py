@@ -40,8 +40,8 @@ def test_a_fixed_variable_is_not_searched_but_is_in_every_design() -> None:
 
 def test_optional_variables_are_searched_when_they_are_chosen() -> None:
     space = build(["gain", "shape", "stride"])
-    assert space.low.tolist() == [0.0, 1.0, 0.1]
-    assert space.high.tolist() == [2.0, 3.0, 0.2]
+    assert space.box.low.tolist() == [0.0, 1.0, 0.1]
+    assert space.box.high.tolist() == [2.0, 3.0, 0.2]
 
 
 def test_integers_are_rounded_and_nothing_else_is() -> None:
@@ -63,7 +63,7 @@ def test_custom_bounds_keep_the_unit_of_the_catalogue() -> None:
 
 def test_each_choice_has_an_equal_share_of_the_range_that_is_searched() -> None:
     space = only_law()
-    positions = np.linspace(space.low[0], space.high[0], 3001).reshape(-1, 1)
+    positions = np.linspace(space.box.low[0], space.box.high[0], 3001).reshape(-1, 1)
     indices, counts = np.unique(space.designs(positions)[:, 0], return_counts=True)
     assert indices.tolist() == [0.0, 1.0, 2.0]
     assert counts.max() - counts.min() <= 1

@@ -231,7 +231,7 @@ def test_beats_random_search_by_far_on_the_mixed_integer_function_of_the_thesis(
             f_d7c0r0i1,
             70,
         )
-        points = np.random.default_rng(seed).uniform(MIXED.low, MIXED.high, (40 * 70, 7))
+        points = np.random.default_rng(seed).uniform(MIXED.box.low, MIXED.box.high, (40 * 70, 7))
         ratios.append(swarm_best / float(f_d7c0r0i1(points).min()))
     assert float(np.median(ratios)) < 0.3
 

@@ -67,7 +67,6 @@ def test_stored_histories_are_judged_alike(fields: dict[str, Any]) -> None:
     job = spec(**fields)
     columns = columns_of(OBJECTIVES[:, :, :5], own=PREFERENCES["C"], aggregation=job.aggregation)
     assert columns.fitness == pytest.approx(fitness(job), rel=1e-12)
-    assert job.aggregation is not None
     feedback = objective_vectors(columns, aggregation=job.aggregation)
     alone = job.model_copy(update={"optimizer": spec(optimizer={"name": "hype"}).optimizer})
     assert alone.search_feedback(OBJECTIVES, NONE_FAILED, fitness(job)) == pytest.approx(feedback)

@@ -70,11 +70,11 @@ def test_no_settings_and_no_fitness_lead_out_of_the_box_or_off_the_bits(
         },
         seed=seed,
     )
-    space = spec.design_space()
+    box = spec.design_space().box
     straight, reloaded = spec.create_search(), spec.create_search()
     for k in range(5):
         positions = straight.ask()
-        assert (positions >= space.low).all() and (positions <= space.high).all()
+        assert (positions >= box.low).all() and (positions <= box.high).all()
         state = json.loads(json.dumps(reloaded.dump(), allow_nan=False))
         reloaded = spec.create_search()
         reloaded.load(state)

@@ -229,11 +229,11 @@ def test_constraints_at_their_limit_are_named_with_their_closest_place() -> None
 def test_bounds_of_a_design_are_named_and_those_that_can_be_widened_all_at_once() -> None:
     spec = tuning().resolved()
     space = spec.design_space()
-    middle = (space.low + space.high) / 2.0
+    middle = (space.box.low + space.box.high) / 2.0
     assert bounds_reached(spec, middle) == []
     assert list(bounds_in_words([], 9)) == []
 
-    design = np.where([v.name in ("FI1R", "FOMF") for v in space.variables], space.high, middle)
+    design = np.where([v.name in ("FI1R", "FOMF") for v in space.variables], space.box.high, middle)
     bounds = bounds_reached(spec, design)
     assert [(bound.name, bound.at) for bound in bounds] == [("FI1R", "high"), ("FOMF", "high")]
     assert list(bounds_in_words(bounds, 9)) == [

@@ -107,7 +107,7 @@ def test_a_spec_comes_back_exactly(store: Store, low: float, seed: int) -> None:
     found = store.job(job.id).spec
     assert found == asked.resolved()
     assert bits(found.fixed["I"]) == bits(low)
-    assert bits(found.design_space().low) == bits(low)
+    assert bits(found.design_space().box.low) == bits(low)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

@@ -125,8 +125,8 @@ def variants(robot: str, *, designs: int, with_backlash: int, long: int) -> tupl
 def compare(variant: Variant, *, seed: int, cpus: int | None) -> Agreement:
     """Simulate random designs of the main Fuzzy-PI in both precisions."""
     space = JobSpec().design_space()
-    share = np.random.default_rng(seed).random((variant.designs, len(space.low)))
-    rows = space.simulated(space.designs(space.low + share * (space.high - space.low)))
+    share = np.random.default_rng(seed).random((variant.designs, len(space.box.low)))
+    rows = space.simulated(space.designs(space.box.low + share * (space.box.high - space.box.low)))
     designs = dict(zip(space.names, rows.T, strict=True))
     heavier = tuple(s.model_copy(update={"load": s.load + MILLIGRAM}) for s in variant.scenarios)
 

@@ -35,7 +35,6 @@ class WidenedView(View):
 
 
 def bound_at(variable: Variable, value: float) -> End | None:
-    """Return the bound at which a value lies."""
     # Every value of a categorical variable, or of one of two integers, is at an end.
     span = variable.high - variable.low
     if variable.kind == "categorical" or (variable.kind == "integer" and span < 2):
@@ -75,7 +74,6 @@ def _wider(variable: Variable, at: End) -> Iterator[tuple[float, float]]:
 
 
 def _rounded(variable: Variable, bound: float) -> float:
-    """Round a bound to six digits."""
     return bound if variable.kind == "integer" else float(f"{bound:.6g}")
 
 

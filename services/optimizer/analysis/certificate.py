@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final
+from collections.abc import Callable
+from typing import Annotated, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +34,9 @@ from gaitswarm.sim.mujoco.engines import ENGINES
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotSource
 
-QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+T = TypeVar("T")
 
-"""Level of the conditional value at risk and of all intervals."""
+QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 MOST_WORST: Final = 1000
 """Limit on the number of worst worlds listed."""
@@ -248,10 +249,7 @@ def certificate(
                 fell=proportion(fell[:, k]),
                 failed=proportion(drawn.failed[:, k]),
                 utility=_spread(utilities[:, k]),
-                objectives={
-                    objective.name: _spread(values[:, k, m])
-                    for m, objective in enumerate(spec.objectives)
-                },
+                objectives=_by_objective(spec, _spread, values[:, k]),
             )
             for k, name in enumerate(spec.case_names)
         },
@@ -268,6 +266,13 @@ def _sizes(objectives: Floats) -> Floats:
     return values
 
 
+def _by_objective(
+    spec: CertificateSpec, view: Callable[[Floats], T], values: Floats
+) -> dict[str, T]:
+    """Return views of the columns of values (n, m)."""
+    return {o.name: view(column) for o, column in zip(spec.objectives, values.T, strict=False)}
+
+
 def _engines(spec: CertificateSpec, nominal: EvaluationColumns) -> dict[str, ComparedEngineView]:
     """Compare other engines with ours; nominal: a row for each, ours first."""
     judged = spec.judge(nominal.objectives, nominal.failed)
@@ -282,10 +287,7 @@ def _engines(spec: CertificateSpec, nominal: EvaluationColumns) -> dict[str, Com
                     ours=statuses[0][k],
                     theirs=statuses[row][k],
                     utility=_compared(utilities[[0, row], k]),
-                    objectives={
-                        objective.name: _compared(values[[0, row], k, m])
-                        for m, objective in enumerate(spec.objectives)
-                    },
+                    objectives=_by_objective(spec, _compared, values[[0, row], k]),
                 )
                 for k, case in enumerate(spec.case_names)
             },
@@ -336,31 +338,28 @@ def _spread(values: Floats) -> SpreadView:
 def _worst(
     job_id: str, spec: CertificateSpec, taken: EvaluationColumns, judged: Judgement, most: int
 ) -> list[WorldView]:
-    failed, logarithms = taken.failed[1:], judged.log_utilities
+    failed, logarithms = taken.failed, judged.log_utilities
     # The last key sorts first; ties keep their order.
-    order = np.lexsort((-judged.fitness[1:], -failed.sum(axis=1)))[:most]
+    order = np.lexsort((-judged.fitness[1:], -failed[1:].sum(axis=1)))[:most]
     space, names = spec.design_space(), spec.case_names
-    drawn = set(spec.world_space().names)
+    drawn = spec.world_space().names
     nominal = np.where(np.isfinite(logarithms[0]), logarithms[0], 0.0)
     results = []
-    for world in order.tolist():
-        row = world + 1
-        failures = {
-            names[k]: Status(int(taken.statuses[row, k])).label
-            for k in np.flatnonzero(failed[world])
-        }
+    for row in (order + 1).tolist():
+        statuses = zip(names, taken.statuses[row].tolist(), strict=True)
+        failures = {name: Status(code).label for name, code in statuses if code != Status.OK}
         scenario = next(iter(failures), names[int(np.argmax(logarithms[row] - nominal))])
         shown = space.shown(taken.designs[row].tolist())
         results.append(
             WorldView(
-                world=world,
+                world=row - 1,
                 iteration=int(taken.iteration[row]),
                 particle=int(taken.particle[row]),
                 fitness=float(judged.fitness[row]),
                 failures=failures,
                 scenario=scenario,
-                values={name: value for name, value in shown.items() if name in drawn},
-                replay=f"gaitswarm certify {job_id} --replay {world} --scenarios {scenario}",
+                values={name: shown[name] for name in shown if name in drawn},
+                replay=f"gaitswarm certify {job_id} --replay {row - 1} --scenarios {scenario}",
             )
         )
     return results
@@ -369,11 +368,9 @@ def _worst(
 def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> list[InfluenceView]:
     """worlds: (n, v) drawn values."""
     results = []
-    for j, variable in enumerate(spec.world_space().variables):
-        if variable.name == _SEED:
-            continue
-        correlation = spearman(worlds[:, j], fitness)
-        if not math.isnan(correlation):
+    for variable, values in zip(spec.world_space().variables, worlds.T, strict=False):
+        correlation = spearman(values, fitness)
+        if variable.name != _SEED and not math.isnan(correlation):
             low, high = _interval(correlation, len(worlds))
             results.append(
                 InfluenceView(name=variable.name, correlation=correlation, low=low, high=high)

@@ -117,18 +117,15 @@ def comparison(
     store: Store, jobs: Sequence[Job], fitness: Sequence[NDArray[np.float64]]
 ) -> JobComparisonView:
     """Compare jobs by the fitness (r,) of their designs, +inf for failed ones."""
-    convergences = [convergence(store, job.id, POINTS) for job in jobs]
     differences = list(_differences([job.spec.model_dump(mode="json") for job in jobs]))
     return JobComparisonView(
-        jobs=[_compared(*parts) for parts in zip(jobs, fitness, convergences, strict=True)],
+        jobs=[_compared(store, *parts) for parts in zip(jobs, fitness, strict=True)],
         differences=differences,
         comparable=_MEASURE.isdisjoint(d.field.split(".")[0] for d in differences),
     )
 
 
-def _compared(
-    job: Job, fitness: NDArray[np.float64], convergence: ConvergenceView
-) -> ComparedJobView:
+def _compared(store: Store, job: Job, fitness: NDArray[np.float64]) -> ComparedJobView:
     finite = fitness[np.isfinite(fitness)]
     return ComparedJobView(
         id=job.id,
@@ -139,7 +136,7 @@ def _compared(
         gain=job.gain,
         evaluations=len(fitness),
         failed=len(fitness) - len(finite),
-        convergence=convergence,
+        convergence=convergence(store, job.id, POINTS),
         shares=_SHARES.tolist() if len(finite) else [],
         fitness=np.quantile(finite, _SHARES).tolist() if len(finite) else [],
     )
@@ -148,13 +145,12 @@ def _compared(
 def convergence(store: Store, job_id: str, points: int) -> ConvergenceView:
     """Thin a job's iterations to some points."""
     iterations: list[Iteration] = []
-    after: int | None = None
-    while True:
+    more = True
+    while more:
+        after = iterations[-1].index if iterations else None
         page = store.iterations(job_id, after=after, limit=_PAGE)
         iterations += page.items
-        if page.next is None or not page.items:
-            break
-        after = page.items[-1].index
+        more = page.next is not None
     count = len(iterations)
     evaluations = np.cumsum([i.designs for i in iterations], dtype=np.int64)
     seconds = np.cumsum([i.evaluate_seconds for i in iterations], dtype=np.float64)
@@ -196,12 +192,18 @@ def _leaves(value: Any, path: str, lacked: set[str]) -> Iterator[tuple[str, str]
     for inner, item, named in parts:
         if named and path == "variables":
             yield inner, Variable.model_validate(item).range_in_words
-        elif named and inner in lacked:
-            yield inner, _json(_content(item, path))
+            continue
+        content = item
+        if named and inner in lacked and path == "scenarios":
+            content = Scenario.model_validate(item).model_dump(mode="json", exclude_defaults=True)
+        if named:
+            content = {k: part for k, part in content.items() if k != "name"} or content
+        if named and inner in lacked:
+            yield inner, json.dumps(content, ensure_ascii=False)
         else:
-            yield from _leaves(_rest(item) if named else item, inner, lacked)
+            yield from _leaves(content, inner, lacked)
     if not parts:
-        yield path, _json(value)
+        yield path, json.dumps(value, ensure_ascii=False)
 
 
 def _parts(value: Any, path: str) -> Iterator[tuple[str, Any, bool]]:
@@ -212,22 +214,6 @@ def _parts(value: Any, path: str) -> Iterator[tuple[str, Any, bool]]:
     elif isinstance(value, list) and all(_named(item) for item in value):
         for item in value:
             yield f"{path}.{item['name']}", item, True
-
-
-def _content(item: dict[str, Any], path: str) -> dict[str, Any]:
-    """Content of a list's item; of a scenario its values that are not defaults."""
-    if path == "scenarios":
-        item = Scenario.model_validate(item).model_dump(mode="json", exclude_defaults=True)
-    return _rest(item)
-
-
-def _rest(item: dict[str, Any]) -> dict[str, Any]:
-    """Fields of a list's item other than its name."""
-    return {name: part for name, part in item.items() if name != "name"} or item
-
-
-def _json(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _named(item: Any) -> bool:

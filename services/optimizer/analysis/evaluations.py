@@ -90,12 +90,6 @@ _EVALUATIONS: Final = TypeAdapter(list[EvaluationView])
 
 def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
     """Make views of evaluations of one job."""
-    # One validation for all: a call for each result would dominate.
-    return _EVALUATIONS.validate_python(_documents(evaluations, spec))
-
-
-def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, object]]:
-    """Fields of `EvaluationView`, in its order."""
     if not evaluations:
         return []
     space = spec.design_space()
@@ -106,7 +100,7 @@ def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, 
     violations = spec.violations(objectives, failed)
     by_design = [None] * len(evaluations) if violations is None else violations.tolist()
     columns = [[c.name for c in columns] for columns in (spec.objectives, spec.measurements)]
-    return [
+    documents = [
         {
             "iteration": evaluation.iteration,
             "particle": evaluation.particle,
@@ -120,6 +114,8 @@ def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, 
         }
         for evaluation, log_utilities, violation in zip(evaluations, logs, by_design, strict=True)
     ]
+    # One validation for all: a call for each result would dominate.
+    return _EVALUATIONS.validate_python(documents)
 
 
 def case_results(

@@ -17,6 +17,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, zip_longest
 from typing import Any, Final
 
@@ -69,17 +70,13 @@ def retraced(
             raise TimeoutError(f"at iteration {index} of {len(positions)}")
         # Some methods' dumps grow with all their feedback.
         state = search.dump() if searches else {}
-        while not _asks_for(search, expected):
+        # The shape of positions (n, d) follows from their number and their bytes.
+        while search.ask(len(expected)).tobytes() != expected.tobytes():
             if not searches:
                 raise ValueError(f"its search asks for other designs in iteration {index}")
             search = searches.pop(0)
             search.load(state)
     return search
-
-
-def _asks_for(search: Optimizer, positions: Floats) -> bool:
-    actual = search.ask(len(positions))
-    return actual.shape == positions.shape and actual.tobytes() == positions.tobytes()
 
 
 Design = dict[str, float | str]
@@ -170,7 +167,6 @@ class Parent:
     digest: str | None = None  # of the last of them; None if it is not chained
 
     def by_iteration(self, column: Floats) -> tuple[Floats, ...]:
-        """Split a column by iteration."""
         ends = np.flatnonzero(np.diff(self.columns.iteration)) + 1
         return tuple(np.split(column, ends))
 
@@ -243,7 +239,12 @@ def forked(
                 ) from error
             reason = str(error)
         else:
-            _check_budget(spec, len(fitness))
+            if spec.budget <= len(fitness):
+                raise InvalidRequest(
+                    f"the {len(fitness)} evaluations taken over exhaust the budget of"
+                    f" {spec.budget}; use more iterations, counted from the parent's first",
+                    field="iterations",
+                )
             taken = TakenHistory(
                 state,
                 parent.by_iteration(fitness) if changed else None,
@@ -280,36 +281,24 @@ def _search_state(
     parent: Parent, spec: AnySpec, rejudged: Floats | None, until: float
 ) -> dict[str, Any]:
     """Return the optimizer's dump after the last ask taken over, by `rejudged` (r,) if given."""
-    positions, feedback = (
-        parent.positions(),
-        parent.feedback(parent.job.spec, parent.columns.fitness),
-    )
-    budgets = budgets_of(parent.job)
+    positions = parent.positions()
+    retrace = partial(retraced, spec, budgets_of(parent.job), positions, until=until)
+    feedback = parent.feedback(parent.job.spec, parent.columns.fitness)
     if rejudged is None:
-        return stored_state(retraced(spec, budgets, positions, feedback, until=until))
+        return stored_state(retrace(feedback))
     rejudged_feedback = parent.feedback(spec, rejudged)
     try:
         # Any method that would have asked for the same positions can continue.
-        return stored_state(retraced(spec, budgets, positions, rejudged_feedback, until=until))
+        return stored_state(retrace(rejudged_feedback))
     except ValueError:
-        search = retraced(spec, budgets, positions, feedback, until=until)
-    name = spec.optimizer.name
+        search = retrace(feedback)
     if isinstance(search, Rejudging):
         search.rejudge(list(zip(positions[:-1], rejudged_feedback[:-1], strict=True)))
         return stored_state(search)
     raise ValueError(
-        f"{name} would have asked for other designs by this preference, and cannot learn from"
-        " the parent's"
+        f"{spec.optimizer.name} would have asked for other designs by this preference, and cannot"
+        " learn from the parent's"
     )
-
-
-def _check_budget(spec: AnySpec, evaluations: int) -> None:
-    if spec.budget <= evaluations:
-        raise InvalidRequest(
-            f"the {evaluations} evaluations taken over exhaust the budget of {spec.budget};"
-            " use more iterations, counted from the parent's first",
-            field="iterations",
-        )
 
 
 def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) -> None:

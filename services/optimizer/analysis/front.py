@@ -254,7 +254,9 @@ def pareto_front(
     columns: EvaluationColumns, vectors: Floats, spec: JobSpec, *, most: int, infeasible: int = 0
 ) -> FrontView:
     """Find the front of (r, M) objective vectors, at least one row finite."""
-    records = _best_at_their_time(vectors)
+    # Rows without any earlier one that is as good in all objectives.
+    time = np.arange(len(vectors), dtype=np.float64)
+    records = np.flatnonzero(non_dominated(np.column_stack([time, vectors])))
     rows = records[non_dominated(vectors[records])]
     logarithms, low, span = _logarithms(vectors, rows)
     normalised = (logarithms - low) / span
@@ -272,16 +274,11 @@ def pareto_front(
         np.flatnonzero(np.isfinite(vectors[:, 0])) if infeasible else np.arange(len(vectors))
     )
     among = columns.rows(candidates)
-    winners = {
-        name: int(candidates[fitness.argmin()])
-        for name, fitness in [
-            *(
-                (name, fitness_by(among, preference, aggregation=spec.aggregation))
-                for name, preference in NAMED.items()
-            ),
-            ("job", among.fitness),
-        ]
+    winners: dict[PreferenceOwner, int] = {
+        name: int(candidates[fitness_by(among, other, aggregation=spec.aggregation).argmin()])
+        for name, other in NAMED.items()
     }
+    winners["job"] = int(candidates[among.fitness.argmin()])
 
     marks: dict[int, list[str]] = {}
     for number, (row, _) in enumerate(knees, start=1):
@@ -293,10 +290,8 @@ def pareto_front(
         marks.setdefault(row, []).append(label)
 
     def fields(row: int) -> dict[str, Any]:
-        return {
-            **design_fields(columns, vectors, spec, row),
-            "normalised": by_objective(normalised[row]),
-        }
+        normal = by_objective(normalised[row])
+        return {**design_fields(columns, vectors, spec, row), "normalised": normal}
 
     judged = int(np.isfinite(vectors[:, 0]).sum())
     return FrontView(
@@ -369,12 +364,6 @@ def front_knees(normalised: Floats, rows: Rows, extremes: Rows) -> list[tuple[in
     return result
 
 
-def _best_at_their_time(vectors: Floats) -> Rows:
-    """Rows without any earlier one that is as good in all objectives."""
-    time = np.arange(len(vectors), dtype=np.float64)
-    return np.flatnonzero(non_dominated(np.column_stack([time, vectors])))
-
-
 def _logarithms(vectors: Floats, rows: Rows) -> tuple[Floats, Floats, Floats]:
     """(r, M) logarithms; (M,) the front's minimum; (M,) its range, 1 if there is none."""
     positive = np.where(vectors > 0.0, vectors, np.inf)
@@ -405,11 +394,10 @@ def _spread(normalised: Floats, rows: Rows, named: Sequence[int], most: int) -> 
     chosen = np.isin(rows, named)
     points = normalised[rows]
     distance = np.full(len(points), np.inf)
-    for point in points[chosen]:
-        np.minimum(distance, np.square(points - point).sum(axis=1), out=distance)
-    while np.count_nonzero(chosen) < most:
-        farthest = int(distance.argmax())
-        chosen[farthest] = True
-        apart = np.square(points - points[farthest]).sum(axis=1)
+    following = np.flatnonzero(chosen).tolist()
+    while following or np.count_nonzero(chosen) < most:
+        place = following.pop() if following else int(distance.argmax())
+        chosen[place] = True
+        apart = np.square(points - points[place]).sum(axis=1)
         np.minimum(distance, apart, out=distance)
     return rows[chosen]

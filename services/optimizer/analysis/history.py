@@ -126,7 +126,6 @@ class HistoryCache:
 
 
 def no_rows(spec: Spec) -> EvaluationColumns:
-    """Return the columns of no evaluations."""
     cases = len(spec.case_names)
     return EvaluationColumns(
         iteration=np.empty(0, dtype=np.int64),

@@ -311,7 +311,11 @@ def target_results(
     """Compare the best design of all runs with the targets; bests: those in double precision."""
     simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
     differences = spec.differences(simulated)
-    run, best = _best_of_all(runs) if bests is None else _best_in_double(bests)
+    if bests is None:
+        run = int(np.argmin([columns.fitness.min(initial=math.inf) for columns in runs]))
+        (best,) = evaluations_of(runs[run].rows(np.array([runs[run].fitness.argmin()])))
+    else:
+        run, best = _best_in_double(bests)
     of_best = spec.simulated(best.objectives[None], (best.statuses != Status.OK)[None])
     off = spec.differences(of_best)
     results = []
@@ -342,13 +346,6 @@ def target_results(
         design=spec.design_space().shown(best.design.tolist()),
         targets=results,
     )
-
-
-def _best_of_all(runs: Sequence[EvaluationColumns]) -> tuple[int, Evaluation]:
-    """Return the run of the best design, and its evaluation."""
-    run = int(np.argmin([columns.fitness.min(initial=math.inf) for columns in runs]))
-    (best,) = evaluations_of(runs[run].rows(np.array([runs[run].fitness.argmin()])))
-    return run, best
 
 
 def _best_in_double(bests: Sequence[Evaluation]) -> tuple[int, Evaluation]:

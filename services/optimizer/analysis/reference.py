@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, TypeVar, cast
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
@@ -49,34 +49,29 @@ S = TypeVar("S", bound=Spec)
 NONE: Final = Reference(None, None)
 """For a job with a plug-in's case."""
 
-_JUDGED_BY: Final = frozenset(
-    {
-        *("robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"),
-        *("scenario_weights", "scenario_aggregate", "case"),
-    }
-)
+_JUDGED_BY: Final = {
+    *("robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"),
+    *("scenario_weights", "scenario_aggregate", "case"),
+}
 """Fields of a spec on which a reference depends."""
 
 _log = logging.getLogger(__name__)
 
 
-def walked_reference(spec: Spec) -> Reference:
+def walked_reference(spec: JobSpec) -> Reference:
     """Simulate the published or start design of a job in the job's cases."""
     reference = reference_design(spec)
-    if reference is None or not isinstance(spec, JobSpec):
-        return NONE
-    name, kind, design = reference
-    return _walked(spec, spec.controller, design, name, kind)
+    return NONE if reference is None else _walked(spec, spec.controller, *reference)
 
 
 def _walked(
     spec: JobSpec,
     controller: ControllerName,
-    design: Mapping[str, float],
     name: str,
     kind: ReferenceKind,
+    design: Mapping[str, float],
 ) -> Reference:
-    judged_by = spec.model_dump_json(include=set(_JUDGED_BY))
+    judged_by = spec.model_dump_json(include=_JUDGED_BY)
     objectives, failed = by_design(_simulated(judged_by, controller, tuple(design.items())))
     fitness = float(JobSpec.model_validate_json(judged_by).judge(objectives, failed).fitness[0])
     results = objectives[0].astype("<f8").tobytes()
@@ -150,9 +145,8 @@ def _values(
     design: Mapping[str, float],
 ) -> dict[str, dict[str, float]]:
     """Simulate a reference and return its values by case and quantity."""
-    outcomes = _simulated(
-        spec.model_dump_json(include=set(_JUDGED_BY)), controller, tuple(design.items())
-    )
+    judged_by = spec.model_dump_json(include=_JUDGED_BY)
+    outcomes = _simulated(judged_by, controller, tuple(design.items()))
     values: dict[str, dict[str, float]] = {}
     for case, column in spec.constraint_cases.limited(constraint):
         name, status = spec.case_names[case], Status(outcomes[case].statuses[0])
@@ -218,13 +212,13 @@ def with_other_reference(
     if spec.case is not None:
         raise InvalidRequest("a plug-in evaluates the designs of the job", field="against")
     try:
-        choice, kind = reference_choice(against), "design"
-        controller, design = _referred(spec, choice, job_of, best_of)
-        name = GIVEN
+        choice, name = reference_choice(against), GIVEN
+        kind: ReferenceKind = "design"
         if isinstance(choice, str):
             name = choice.removeprefix(PUBLISHED)
             kind = "job" if name == choice else "published"
-        reference = _walked(spec, controller, design, name, cast("ReferenceKind", kind))
+        controller, design = _referred(spec, choice, job_of, best_of)
+        reference = _walked(spec, controller, name, kind, design)
     except (GaitswarmError, SimulationError, ValueError) as error:
         raise InvalidRequest(str(error), field="against") from error
     job = replace(job, reference=reference)
@@ -263,14 +257,11 @@ def note_reference(store: Store, job: Job) -> Job:
     if job.reference is not None:
         return job
     try:
-        job, reason = with_reference(store, job)
+        job, _ = with_reference(store, job)
     except StoreUnavailable as error:
         # Determined on the next request for the gain.
         _log.warning("job %s: its reference was not determined: %s", job.id, error)
     except Exception:  # noqa: BLE001
         # The job's results are stored and do not depend on it.
         _log.exception("job %s: its reference was not determined", job.id)
-    else:
-        if reason is not None:
-            _log.debug("job %s: no gain: %s", job.id, reason)
     return job

@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.analysis.distribution import CONFIDENCE, resam
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.designs import WalksRequest
-from gaitswarm.services.optimizer.jobs.preference import WEIGHED, WEIGHED_NAMES
+from gaitswarm.services.optimizer.jobs.preference import WEIGHED, WEIGHED_NAMES, by_design
 from gaitswarm.services.optimizer.jobs.sensitivity import (
     LocalSample,
     local_sample,
@@ -33,7 +33,7 @@ from gaitswarm.sim.catalogue import design_catalogue, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable, VariableChoice
 
@@ -65,7 +65,6 @@ class RobustnessRequest(WalksRequest):
     seed: int = Field(default=1, ge=0, lt=2**63, description="Of the sample.")
 
     def sample(self) -> LocalSample:
-        """Sample designs around the given one."""
         return local_sample(
             self.numbers,
             tuple(self._resolved_variables()),
@@ -170,11 +169,9 @@ def robustness_view(
     request: RobustnessRequest, sample: LocalSample, outcomes: Sequence[Outcome]
 ) -> RobustnessView:
     """Estimate the robustness of a design from the outcomes of a sample in its scenarios."""
-    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
-    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
     names = [scenario.name for scenario in request.resolved_scenarios()]
     return RobustnessView(
-        **dict(sensitivities(sample, objectives, failed, names)),
+        **dict(sensitivities(sample, *by_design(outcomes), names)),
         **request.model_dump(include={"controller", "precision", "samples", "radius", "seed"}),
         robot=request.robot,
         design=design_shown(request.controller, request.numbers),

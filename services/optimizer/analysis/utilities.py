@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.jobs.constraints import violations
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregation
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import PLAIN, Aggregation
 from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, PREFERENCES, Preference
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.arrays import Floats
@@ -90,12 +90,10 @@ def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
 
 
 def fitness_by(
-    columns: EvaluationColumns, preference: Preference, *, aggregation: Aggregation | None = None
+    columns: EvaluationColumns, preference: Preference, *, aggregation: Aggregation = PLAIN
 ) -> Floats:
     """Return the (r,) fitness by a preference (eq. 4.2), +inf after failure or overflow."""
-    logarithms = log_utilities(columns, preference)
-    if aggregation is not None:
-        logarithms = aggregation.aggregated(logarithms)
+    logarithms = aggregation.aggregated(log_utilities(columns, preference))
     failed = np.isposinf(logarithms).any(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         return np.where(failed, np.inf, np.exp(logarithms.mean(axis=1)))
@@ -105,7 +103,7 @@ def objective_vectors(
     columns: EvaluationColumns,
     bias: Sequence[float] = (0.0,) * 5,
     *,
-    aggregation: Aggregation | None = None,
+    aggregation: Aggregation = PLAIN,
 ) -> Floats:
     """Return each design's (r, M) objectives over all scenarios, minimized."""
     result = np.empty((len(columns), len(bias)))

@@ -369,7 +369,6 @@ def relaxed(constraints: Sequence[Constraint], violated: Sequence[LimitView]) ->
 
 
 def bounds_reached(spec: JobSpec, design: Floats) -> list[BoundView]:
-    """Return variables of a design at a bound."""
     reached: list[BoundView] = []
     wider: Spec = spec
     for variable, value in zip(spec.design_space().variables, design.tolist(), strict=False):
@@ -383,7 +382,6 @@ def bounds_reached(spec: JobSpec, design: Floats) -> list[BoundView]:
 
 
 def bounds_in_words(bounds: Sequence[BoundView], variables: int) -> Iterator[str]:
-    """Yield a sentence on the variables at a bound."""
     if bounds:
         values = [
             f"{bound.name} at {bound.bound:g}{'' if bound.unit == '1' else f' {bound.unit}'}"

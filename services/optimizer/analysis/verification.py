@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -104,12 +103,14 @@ def check_history(store: Store, job: Job, *, head: str | None = None) -> History
     chain = Chain(store.chain_documents(job.id), spec)
     broken_at, problem, sizes = None, "", list[int]()
     try:
-        summary = _Summary(job)
-        for link, columns, reevaluation in _stored(store, job):
-            chain.extend(link, columns, reevaluation)
-            _check_ask(link)
-            summary.extend(link, columns, reevaluation)
-            sizes.append(len(columns))
+        summary, end, step = _Summary(job), job.progress.iterations, iterations_of(PIECE, job)
+        for first in range(0, end, step):
+            stored = _between(store, job.id, first, min(first + step, end))
+            for link, columns, reevaluation in stored:
+                chain.extend(link, columns, reevaluation)
+                _check_ask(link)
+                summary.extend(link, columns, reevaluation)
+                sizes.append(len(columns))
         _check_next(store, job)
         problem = summary.problem() or (
             "the digest of the job is not that of its last iteration"
@@ -118,28 +119,15 @@ def check_history(store: Store, job: Job, *, head: str | None = None) -> History
         )
     except BrokenChain as broken:
         broken_at, problem = broken.iteration, broken.problem
-    return HistoryCheck(
-        len(sizes),
-        chain.head,
-        broken_at,
-        problem,
-        None if head is None else chain.places.get(head),
-        tuple(sizes),
-    )
+    place = chain.places.get(head or "")
+    return HistoryCheck(len(sizes), chain.head, broken_at, problem, place, tuple(sizes))
 
 
 Stored = tuple[Link, EvaluationColumns, Reevaluation | None]
 
 
-def _stored(store: Store, job: Job) -> Iterator[Stored]:
-    """Yield a job's committed iterations, in order. Raises BrokenChain."""
-    end = job.progress.iterations
-    step = iterations_of(PIECE, job)
-    for first in range(0, end, step):
-        yield from _between(store, job.id, first, min(first + step, end))
-
-
 def _between(store: Store, job_id: str, first: int, last: int) -> Iterator[Stored]:
+    """Yield a job's committed iterations, in order. Raises BrokenChain."""
     try:
         links = {link.iteration: link for link in store.links(job_id, first, last)}
         columns = store.evaluation_columns(job_id, first, last)
@@ -197,7 +185,7 @@ class _Summary:
         self._single = job.readable and job.spec.precision != "double"
         self._readable = job.readable
         self._best: float | None = None
-        self._place: tuple[int, int] | None = None
+        self._place: tuple[int | None, int | None] = (None, None)
         self._evaluations = self._infeasible = 0
         self._least_violation: float | None = None
 
@@ -211,12 +199,9 @@ class _Summary:
             return
         particle, best = best_particle(columns.fitness), None
         if self._single:
-            particle = (
-                None
-                if reevaluation is None or math.isinf(reevaluation.fitness)
-                else reevaluation.particle
-            )
-            best = None if reevaluation is None or particle is None else reevaluation.fitness
+            particle = None
+            if reevaluation is not None and not math.isinf(reevaluation.fitness):
+                particle, best = reevaluation.particle, reevaluation.fitness
         elif particle is not None:
             best = float(columns.fitness[particle])
         violations = self._job.spec.violations(columns.objectives, columns.failed)
@@ -236,9 +221,7 @@ class _Summary:
         progress = self._progress
         if progress.evaluations != self._evaluations:
             return f"it has {self._evaluations} evaluations, not {progress.evaluations} as recorded"
-        place = None
-        if progress.best_iteration is not None and progress.best_particle is not None:
-            place = (progress.best_iteration, progress.best_particle)
+        place = (progress.best_iteration, progress.best_particle)
         if self._readable and (progress.best_fitness, place) != (self._best, self._place):
             return "its recorded best design is not the best of its iterations"
         if self._readable and (
@@ -273,17 +256,14 @@ def _why(spec: AnySpec | None, link: Link, columns: EvaluationColumns) -> str:
     )
     if spec is None:
         return generic
-    try:
+    # Damaged values may raise any error.
+    with suppress(Exception):
         designs = spec.design_space().designs(link.positions)
-        (rows,) = np.nonzero((designs != columns.designs).any(axis=1))
-        if len(rows):
-            return f"design {rows[0]} differs from the ask"
+        for row in np.flatnonzero((designs != columns.designs).any(axis=1)):
+            return f"design {row} differs from the ask"
         fitness = judged(spec, columns).view(np.uint64)
-        (rows,) = np.nonzero(fitness != columns.fitness.view(np.uint64))
-    except Exception:  # noqa: BLE001 - damaged values may raise any error
-        return generic
-    if len(rows):
-        return f"the fitness of design {rows[0]} does not follow from its objectives and statuses"
+        for row in np.flatnonzero(fitness != columns.fitness.view(np.uint64)):
+            return f"the fitness of design {row} does not follow from its objectives and statuses"
     return generic
 
 
@@ -293,10 +273,7 @@ _MOST: Final = 20
 
 def check_histories(store: Store) -> list[str]:
     """Verify the chain of every job from its rows, one job after the other."""
-    return list(islice(_broken(store), _MOST))
-
-
-def _broken(store: Store) -> Iterator[str]:
+    findings: list[str] = []
     for job_id in (job.id for job in every(lambda after: store.jobs(after=after))):
         with suppress(NotFound):
             check = check_history(store, store.job(job_id))
@@ -304,4 +281,9 @@ def _broken(store: Store) -> Iterator[str]:
                 # The rows of a job deleted meanwhile disappear piece by piece.
                 store.job(job_id)
                 where = "" if check.broken_at is None else f"iteration {check.broken_at}: "
-                yield f"job {job_id} differs from what was committed: {where}{check.problem}"
+                findings.append(
+                    f"job {job_id} differs from what was committed: {where}{check.problem}"
+                )
+                if len(findings) == _MOST:
+                    break
+    return findings

@@ -116,7 +116,6 @@ class Constraint(Data):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of the quantities that it limits."""
         return OBJECTIVE_NAMES[:5] if self.quantity == ALL else (self.quantity,)
 
     def __str__(self) -> str:
@@ -125,15 +124,15 @@ class Constraint(Data):
     def texts(self) -> list[str]:
         """Return the limits in the form of `FORM`, except that a design has none."""
         where = "" if self.scenario == ALL else f"{self.scenario}:"
-        reference = self.relative_to
-        named = reference if isinstance(reference, str) else "design"
-        named = named if named == "design" or named.startswith(PUBLISHED) else f"{_JOB}{named}"
+        to = "" if self.relative_to is None else "design"
+        if isinstance(self.relative_to, str):
+            prefix = "" if self.relative_to.startswith(PUBLISHED) else _JOB
+            to = f"{prefix}{self.relative_to}"
         limits = []
         for sign, limit in ((">=", self.min), ("<=", self.max)):
             if limit is not None:
-                factor = "" if reference is not None and limit == 1.0 else f"{limit:g}"
-                times = "*" if factor and reference is not None else ""
-                to = "" if reference is None else named
+                factor = "" if to and limit == 1.0 else f"{limit:g}"
+                times = "*" if to and factor else ""
                 limits.append(f"{where}{self.quantity}{sign}{factor}{times}{to}")
         return limits
 
@@ -230,29 +229,23 @@ class Cases:
         for index, constraint in enumerate(constraints):
             try:
                 for case, column in self.limited(constraint):
-                    value = self._reference(constraint, case, column)
-                    if value is not None or known:
-                        limits += self._of(constraint, index, case, column, value)
+                    limits += self._of(constraint, index, case, column, known=known)
             except ValueError as error:
                 raise ValueError(f"{index}.{error}") from error
         self._check_together(constraints, limits)
         return limits
 
-    def _reference(self, constraint: Constraint, case: int, column: int) -> float | None:
-        """Return the value that limits are multiples of, 1 for absolute ones; None if unknown."""
-        if constraint.relative_to is None:
-            return 1.0
-        values = (constraint.reference or {}).get(self.names[case], {})
-        return values.get(self.columns[column].name)
-
     def _of(
-        self, constraint: Constraint, index: int, case: int, column: int, value: float | None
+        self, constraint: Constraint, index: int, case: int, column: int, *, known: bool
     ) -> Iterator[Limit]:
         name, where = self.columns[column].name, self.names[case]
-        if value is None:
+        value: float | None = 1.0
+        if constraint.relative_to is not None:
+            value = (constraint.reference or {}).get(where, {}).get(name)
+        if value is None and known:
             raise ValueError(f"reference: has no {name} in {where}")
         for sign, factor in ((-1.0, constraint.min), (1.0, constraint.max)):
-            if factor is None:
+            if factor is None or value is None:
                 continue
             if value < 0.0 and factor != 1.0:
                 raise ValueError(
@@ -266,8 +259,8 @@ class Cases:
         least, greatest = dict[tuple[int, int], Limit](), dict[tuple[int, int], Limit]()
         for limit in limits:
             known = greatest if limit.sign > 0.0 else least
-            other = known.get((limit.case, limit.column))
-            if other is None or limit.sign * (limit.bound - other.bound) < 0.0:
+            other = known.setdefault((limit.case, limit.column), limit)
+            if limit.sign * (limit.bound - other.bound) < 0.0:
                 known[limit.case, limit.column] = limit
         for place, low in least.items():
             high = greatest.get(place, low)

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableCatalogue
@@ -73,36 +73,27 @@ class DesignSpace:
     @property
     def names(self) -> tuple[str, ...]:
         """Columns of a design array: searched variables, then fixed ones."""
-        return tuple(variable.name for variable in self.variables) + tuple(
-            name for name, _ in self.fixed
-        )
+        return tuple(variable.name for variable in self.catalogue)
 
     @property
     def box(self) -> Space:
-        """The box of the searched variables."""
         return Space([Axis(v.low, v.high, v.kind) for v in self.variables])
 
     @property
-    def low(self) -> NDArray[np.float64]:
-        """(d,) lower bounds."""
-        return self.box.low
-
-    @property
-    def high(self) -> NDArray[np.float64]:
-        """(d,) upper bounds."""
-        return self.box.high
+    def middle(self) -> Floats:
+        return (self.box.low + self.box.high) / 2.0
 
     @property
     def columns(self) -> tuple[Variable, ...]:
         """The variable of each column of a design array."""
         return (*self.variables, *self.catalogue[len(self.variables) :])
 
-    def designs(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def designs(self, positions: Floats) -> Floats:
         """Return the (n, v) designs of (n, d) positions."""
         held = np.array([value for _, value in self.fixed], dtype=np.float64)
         return np.hstack([self.box.designs(positions), np.tile(held, (len(positions), 1))])
 
-    def positions(self, designs: Sequence[Mapping[str, float | str]]) -> NDArray[np.float64]:
+    def positions(self, designs: Sequence[Mapping[str, float | str]]) -> Floats:
         """Return the positions of designs given by name. Raises ValueError."""
         held = dict(self.fixed)
         rows = []
@@ -126,7 +117,7 @@ class DesignSpace:
                 " or change `fixed`"
             )
 
-    def simulated(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def simulated(self, designs: Floats) -> Floats:
         """Translate designs to the simulator's catalogue, with its indices of choices."""
         translated = designs.copy()
         for j, (column, full) in enumerate(zip(self.columns, self.catalogue, strict=True)):
@@ -148,11 +139,14 @@ class DesignSpace:
         variables = self.columns[len(self.variables) :]
         return {v.name: v.shown(value) for v, (_, value) in zip(variables, self.fixed, strict=True)}
 
+    def simulated_values(self, *positions: Floats) -> Iterator[dict[str, float]]:
+        """Yield the simulated values of the designs of positions, by variable."""
+        for values in self.simulated(self.designs(np.stack(positions))).tolist():
+            yield dict(zip(self.names, values, strict=True))
+
     def corners(self) -> Iterator[dict[str, float]]:
         """Yield the simulated values at all lower and at all upper bounds, by variable."""
-        for corner in (self.low, self.high):
-            (values,) = self.simulated(self.designs(corner.reshape(1, -1)))
-            yield dict(zip(self.names, values.tolist(), strict=True))
+        yield from self.simulated_values(self.box.low, self.box.high)
 
     @contextmanager
     def requested(self) -> Iterator[None]:

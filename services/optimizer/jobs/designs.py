@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat, model_validator
 
-from gaitswarm.services.optimizer.errors import InvalidRequest, simulation_errors
+from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Request
 from gaitswarm.sim.assembly import check_precision
@@ -175,11 +175,8 @@ class WalksRequest(ScenariosRequest):
     def check_walks(self) -> None:
         """Check every scenario before the first simulation."""
         self.check_design()
-        try:
+        with simulation_errors("precision"):
             check_precision(load_robot(self.robot), self.precision)
-        except SimulationInputError as error:
-            text = str(error).removeprefix("precision: ")
-            raise InvalidRequest(text, field="precision") from error
         self.check_gaits()
 
 

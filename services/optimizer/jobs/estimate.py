@@ -7,7 +7,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -19,6 +19,7 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.time_left import EstimateView
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.outcome import Status
@@ -37,24 +38,13 @@ _MOST_WALKS: Final = 1_000_000
 """Limit on simulations per iteration: their results, some 130 B each, are in memory together."""
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """Predicted cost of a job."""
-
-    evaluations: int
-    walks: int
-    simulated_seconds: float  # of all simulations together [s]
-    seconds: float | None  # wall time [s], None if unknown
-    basis: str  # what the wall time is derived from, for people
-
-
-def estimate(spec: Spec, cases: Sequence[Case], measured: MeasuredRates) -> Estimate:
+def estimate(spec: Spec, cases: Sequence[Case], measured: MeasuredRates) -> EstimateView:
     """Estimate a job from the rate of a short simulation in this thread."""
     walked = spec.tuning if isinstance(spec, PreferencesSpec) else spec
     walks = walked.cases({}) if walked is not spec else cases
     rate, basis = measured.rate(walked, walks, walked.create_search().ask())
     simulated = spec.budget * duration(spec, cases)
-    return Estimate(
+    return EstimateView(
         evaluations=spec.budget,
         walks=spec.budget * len(cases),
         simulated_seconds=simulated,

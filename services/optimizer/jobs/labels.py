@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Final
@@ -11,6 +10,7 @@ from typing import Annotated, Final
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.input import Line, Lines
 from gaitswarm.sim.robot.variant import SHIPPED, RobotFiles, RobotSource, RobotVariant
 
@@ -53,7 +53,6 @@ class LabelsChange(BaseModel):
     )
 
     def applied(self, labels: Labels) -> Labels:
-        """Return the changed labels."""
         name = labels.name if self.name is None else self.name.strip() or None
         return Labels(
             name=name,
@@ -76,16 +75,15 @@ class JobFilter:
 ANY_JOB: Final = JobFilter()
 
 
-@dataclass(frozen=True, slots=True)
-class FacetCounts:
-    """Number of jobs by value of each facet; jobs without a value are not counted."""
+class JobFacetsView(View):
+    """Counts of jobs; those without robot, controller or preference count in the total only."""
 
-    total: int
-    states: Counter[str]
-    robots: Counter[str]
-    controllers: Counter[str]
-    preferences: Counter[str]
-    tags: Counter[str]
+    total: int = Field(description="Jobs in all [1].", examples=[1000])
+    states: dict[str, int] = Field(description="By state [1].", examples=[{"succeeded": 12}])
+    robots: dict[str, int] = Field(description="By name of the robot [1].")
+    controllers: dict[str, int] = Field(description="By motor controller [1].")
+    preferences: dict[str, int] = Field(description="By preference, `own` for any other [1].")
+    tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])
 
 
 def robot_name(robot: RobotSource | None) -> str | None:

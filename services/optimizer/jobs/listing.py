@@ -7,13 +7,16 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Any, Final, Generic, TypeVar
 
+from pydantic import Field
+
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.views import View
 
 T = TypeVar("T")
 
@@ -140,13 +143,20 @@ class AuditAction(StrEnum):
     REVOKE_TOKEN = "revoke_token"  # noqa: S105
 
 
-@dataclass(frozen=True, slots=True)
-class AuditEntry:
-    """One change, written in the transaction that made it."""
+class AuditEntryView(View):
+    """One entry of the audit log."""
 
-    index: int  # ascending with time
-    at: datetime  # UTC, by the database's clock
-    actor: str  # name of the token, or `LOCAL`, or `RETENTION`
-    action: AuditAction
-    job_id: str | None = None  # None for an action on no job; the job may have been deleted since
-    details: dict[str, Any] = field(default_factory=dict)  # further content, such as the new budget
+    index: int = Field(description="Index, increasing with time.", examples=[42])
+    at: datetime = Field(description="When, UTC.")
+    actor: str = Field(
+        description="Name of the token; `local` for a client on the machine without one.",
+        examples=["ci"],
+    )
+    action: AuditAction = Field(description="The action.", examples=["cancel"])
+    job_id: str | None = Field(
+        description="The job, which may have been deleted since; null for none.",
+        examples=["k2q7zr5dm9xw"],
+    )
+    details: dict[str, Any] = Field(
+        description="Further content, such as the new budget.", examples=[{"iterations": 50}]
+    )

@@ -51,7 +51,7 @@ def exponential(logarithm: float) -> float:
         return math.inf
 
 
-def by_design(outcomes: tuple[Outcome, ...]) -> tuple[Floats, NDArray[np.bool_]]:
+def by_design(outcomes: Sequence[Outcome]) -> tuple[Floats, NDArray[np.bool_]]:
     """Convert outcomes by case to (n, K, m) objectives and (n, K) failures."""
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)

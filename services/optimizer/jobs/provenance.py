@@ -91,7 +91,6 @@ def changes_since(records: Sequence[ProvenanceRecord], now: JobProvenance) -> tu
 
 
 def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:
-    """Return the records of a new job."""
     return () if provenance is None else with_record((), 0, provenance)
 
 

@@ -30,7 +30,6 @@ class LocalSample:
 
 
 def least_samples(varied: int) -> int:
-    """Return the minimum sample size."""
     return 4 * (varied + 1)
 
 

@@ -30,7 +30,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound, simulation_errors
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.preference import Judgement, by_design
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
@@ -269,27 +269,18 @@ class Spec(BaseModel):
         return self.optimizer
 
     @model_validator(mode="after")
-    def _can_be_resumed(self) -> Self:
+    def _can_search(self) -> Self:
         name = self.optimizer.name
         if METHODS[name].replays and self.budget > LONGEST_REPLAY:
             raise ValueError(
                 f"iterations: {name} is replayed when a job is resumed, so it"
                 f" evaluates {LONGEST_REPLAY} designs at most, not {self.budget}"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _has_objectives_for_method(self) -> Self:
-        name = self.optimizer.name
         if METHODS[name].multi_objective and not self.has_objective_vectors:
             raise ValueError(
                 f"optimizer: {name} is multi-objective, and designs of this kind of job have no"
                 " separate objectives; choose another method"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _can_start(self) -> Self:
         self.start_positions()
         return self
 
@@ -328,12 +319,9 @@ class Spec(BaseModel):
                 f" {method.remedy}",
                 field="optimizer",
             )
-        try:
+        with simulation_errors("precision"):
             for robot in self.robot_sources:
                 check_precision(load_robot(robot), self.precision)
-        except SimulationInputError as error:
-            text = str(error).removeprefix("precision: ")
-            raise InvalidRequest(text, field="precision") from error
 
     def check_recordings(self, find: Callable[[str], RecordedWalk]) -> None:
         """Check that the robot has the joints of each recording, and reaches its gait.

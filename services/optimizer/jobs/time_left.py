@@ -1,4 +1,4 @@
-"""Time to the end of a job, from the pace of its last iterations"""
+"""Estimates of a job's cost: before submission, and to its end by the pace of its iterations"""
 
 from __future__ import annotations
 
@@ -6,13 +6,36 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Final
 
+from pydantic import Field
+
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.views import View
 
 _WEIGHT: Final = 0.3
 """Weight of the last iteration in the moving average."""
 
 _LATE: Final = 2.0
 """An iteration is reported as late beyond this multiple of the recent duration."""
+
+
+class EstimateView(View):
+    """Estimated cost of a job."""
+
+    evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
+    walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
+    simulated_seconds: float = Field(
+        description="Simulated time in total [s]; less for designs that fall.", examples=[20250.0]
+    )
+    seconds: float | None = Field(
+        description="Wall time if it has the machine to itself [s]; null if unknown.",
+        examples=[21.5],
+    )
+    basis: str = Field(
+        description="Basis of the estimate.",
+        examples=[
+            "a simulation measured on this machine, 471 simulated s/s, on all of its 2 cores"
+        ],
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.labels import (
     ANY_JOB,
     OWN,
-    FacetCounts,
+    JobFacetsView,
     JobFilter,
     Labels,
     LabelsChange,
@@ -487,17 +487,18 @@ class Jobs(Aggregate):
         page = Page.of(rows, limit, lambda row: to_cursor(cursor, row["sort_key"], row["id"]))
         return Page(tuple(map(to_job, page.items)), page.next)
 
-    def facets(self, *, archived: bool | None = None) -> FacetCounts:
+    def facets(self, *, archived: bool | None = None) -> JobFacetsView:
         """Count jobs by facet."""
         names = ("state", "robot", "controller", "preference")
         query = sa.select(*(jobs.c[name] for name in names), jobs.c.tags)
         with self._database.read("facets") as connection:
             rows = connection.execute(query.where(*_conditions(JobFilter(archived=archived)))).all()
-        states, robots, controllers, preferences = (
-            Counter(v for row in rows if (v := row[k]) is not None) for k in range(4)
-        )
+        counts = {
+            f"{name}s": Counter(v for row in rows if (v := row[k]) is not None)
+            for k, name in enumerate(names)
+        }
         tags = Counter(tag for row in rows for tag in (row.tags or "").split("\n")[1:-1])
-        return FacetCounts(len(rows), states, robots, controllers, preferences, tags)
+        return JobFacetsView(total=len(rows), tags=tags, **counts)
 
     def queue(self) -> Queue:
         """Count jobs by state and kind. Ended jobs are not read, as there may be very many."""

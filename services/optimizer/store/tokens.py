@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.listing import (
     LOCAL,
     RETENTION,
     AuditAction,
-    AuditEntry,
+    AuditEntryView,
     Page,
     checked_limit,
 )
@@ -103,7 +103,7 @@ class Audit(Aggregate):
 
     def audit(
         self, *, job_id: str | None = None, after: str | None = None, limit: int = 50
-    ) -> Page[AuditEntry]:
+    ) -> Page[AuditEntryView]:
         """Return a page of the audit log, newest first; of a job, which may be deleted, or all."""
         limit = checked_limit(limit)
         others = (column for column in audit.c if column is not audit.c.id)
@@ -119,7 +119,7 @@ class Audit(Aggregate):
             query = query.where(audit.c.id < int(after))
         with self._database.read("audit") as connection:
             rows = connection.execute(query.limit(limit + 1)).mappings().all()
-        entries = [AuditEntry(**{**row, "action": AuditAction(row["action"])}) for row in rows]
+        entries = [AuditEntryView(**row) for row in rows]
         return Page.of(entries, limit, lambda last: str(last.index))
 
     def forget_audit_before(self, moment: datetime) -> int:

@@ -35,7 +35,7 @@ from gaitswarm.sim.mujoco.engines import (
 )
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice, ScenarioName
-from gaitswarm.sim.simulate import check_reach
+from gaitswarm.sim.simulate import check_drives, check_reach
 from gaitswarm.sim.variables import VariableName, VariableValue
 from gaitswarm.sim.worlds.perturbations import (
     DRAWN,
@@ -405,9 +405,8 @@ class CertificateSpec(WalksSpec):
             index: Its number, from 0.
         """
         space = self.world_space()
-        drawn = sample_worlds(index + 1, self.seed, space.variables)[index:]
-        (values,) = space.simulated(space.designs(drawn)).tolist()
-        return dict(zip(space.names, values, strict=True))
+        drawn = sample_worlds(index + 1, self.seed, space.variables)
+        return next(space.simulated_values(drawn[index]))
 
     def check_can_be_simulated(self) -> None:
         """Check the design, the scenarios, and the worlds at both ends of all ranges."""
@@ -417,15 +416,15 @@ class CertificateSpec(WalksSpec):
                 check_installed()
         with simulation_errors("design"):
             law = CONTROLLERS[self.controller].compile(self.numbers)
-        self.check_drives(law)
+        with simulation_errors("controller"):
+            check_drives(law, self.robot)
         names, values = tuple(self.numbers), tuple(self.numbers.values())
         for index, scenario in enumerate(self.resolved_scenarios()):
             with simulation_errors(f"scenarios.{index}"):
                 check_reach(scenario, names, values, robot=self.robot)
         space = self.world_space()
-        corners = np.stack([space.low, space.high])
         with space.requested():
-            worlds = space.simulated(space.designs(corners))
+            worlds = space.simulated(space.designs(np.stack([space.box.low, space.box.high])))
             check_worlds(space.names, worlds)
             check_grounds(self.resolved_scenarios(), space.names, worlds)
 

@@ -177,7 +177,7 @@ class PreferencesSpec(Spec):
         if tuning.start or reference is None:
             return tuning
         space = tuning.design_space()
-        start = nearest_design(tuning, reference[2]) or space.shown((space.low + space.high) / 2.0)
+        start = nearest_design(tuning, reference[2]) or space.shown(space.middle)
         return tuning.model_copy(update={"start": (start,)})
 
     @model_validator(mode="after")

@@ -12,7 +12,6 @@ from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
@@ -74,50 +73,39 @@ class ReferenceView(View):
 
     @classmethod
     def from_reference(cls, reference: Reference | None) -> ReferenceView | None:
-        """Return None without a reference."""
         if reference is None or reference.name is None:
             return None
         return cls.model_validate(reference)
 
 
-def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
-    """Return the design that a job's best is compared with."""
-    if not isinstance(spec, JobSpec) or spec.case is not None:
+def reference_design(spec: JobSpec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
+    """Return the design that a job's best is compared with; None with a plug-in's case."""
+    if spec.case is not None:
         return None
     study = None if isinstance(spec.robot, RobotFiles) else published_study(spec)
     if study is None:
         space = spec.design_space()
-        middle = space.designs(np.array([(space.low + space.high) / 2.0]))
-        (values,) = space.simulated(middle).tolist()
-        return START, "start", dict(zip(space.names, values, strict=True))
+        (values,) = space.simulated_values(space.middle)
+        return START, "start", values
     published = CONTROLLERS[spec.controller].published[study]
     return study, "published", adapted_to_job(published, spec)
 
 
 def published_study(spec: JobSpec) -> str | None:
     """Return the name of the published design that was tuned by the job's preference."""
-    published = CONTROLLERS[spec.controller].published
-    preference = spec.resolved_preference()
-    names = [
-        name for name, other in PREFERENCES.items() if other == preference and name in published
-    ]
-    return next(iter([*names, *published]), None)
+    published, preference = CONTROLLERS[spec.controller].published, spec.resolved_preference()
+    names = (name for name, other in PREFERENCES.items() if other == preference)
+    return next((name for name in (*names, *published) if name in published), None)
 
 
 def adapted_to_job(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
-    """Adapt a published design to a job."""
     space = spec.design_space()
     searched = {variable.name for variable in space.variables}
     conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
-    held = {
-        name: value for name, value in space.fixed if name in conventions or name in GAIT_CATALOGUE
-    }
-    published_values = {
-        name: value
-        for name, value in published.items()
-        if name not in GAIT_CATALOGUE or name in searched
-    }
-    return published_values | held
+    fixed = dict(space.fixed)
+    held = {name: fixed[name] for name in fixed if name in conventions or name in GAIT_CATALOGUE}
+    shared = (name for name in published if name not in GAIT_CATALOGUE or name in searched)
+    return {name: published[name] for name in shared} | held
 
 
 def nearest_design(spec: JobSpec, design: Mapping[str, float]) -> dict[str, float | str] | None:

@@ -36,13 +36,14 @@ from gaitswarm.services.optimizer.jobs.preference import (
     PreferenceChoice,
     figure_of_merit,
     judge,
+    log_utilities,
     objective_vectors,
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
-from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.near_names import instead_of
@@ -65,20 +66,6 @@ class WalksSpec(Scenarios, Spec):
     def resolved_preference(self) -> Preference:
         """Return the preference with a preset resolved."""
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
-
-    def check_drives(self, law: ControlLaw) -> None:
-        """Check that the controller can drive the robot's actuators.
-
-        Args:
-            law: Of any design of the controller.
-
-        Raises:
-            InvalidRequest: It cannot; the field is `controller`.
-        """
-        from gaitswarm.sim.simulate import check_drives
-
-        with simulation_errors("controller"):
-            check_drives(law, self.robot)
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -204,10 +191,8 @@ class JobSpec(WalksSpec):
     scenario_aggregate: ScenarioAggregate = "mean"
 
     @model_validator(mode="after")
-    def _has_weighted_scenarios(self) -> JobSpec:
-        if not self.scenario_weights:
-            return self
-        if self.scenario_aggregate == "worst":
+    def _can_be_run(self) -> JobSpec:
+        if self.scenario_weights and self.scenario_aggregate == "worst":
             raise ValueError("scenario_weights: the worst scenario has no weight; omit them")
         names = [scenario.name for scenario in self.resolved_scenarios()]
         for name in self.scenario_weights:
@@ -215,10 +200,6 @@ class JobSpec(WalksSpec):
                 raise ValueError(
                     f"scenario_weights: the job has no scenario {name!r}; {instead_of(name, names)}"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _can_be_run(self) -> JobSpec:
         if self.case is not None and self.worlds is not None:
             raise ValueError(f"worlds: {self.case.name} supports the nominal model alone; omit it")
         if self.case is not None and self.precision != "double":
@@ -290,7 +271,7 @@ class JobSpec(WalksSpec):
 
     def check_can_be_simulated(self) -> None:
         """Check that the controller compiles and that scenarios' gentlest gaits are in reach."""
-        from gaitswarm.sim.simulate import check_reach
+        from gaitswarm.sim.simulate import check_drives, check_reach
         from gaitswarm.sim.worlds.perturbations import check_worlds
         from gaitswarm.sim.worlds.walks import check_grounds
 
@@ -300,7 +281,8 @@ class JobSpec(WalksSpec):
             with space.requested():
                 law = CONTROLLERS[self.controller].compile(design)
                 with_gait(scenarios[0], _gait_of(design))
-            self.check_drives(law)
+            with simulation_errors("controller"):
+                check_drives(law, self.robot)
         if self.worlds is not None:
             variables = self.worlds.variables()
             ends = np.array([[v.low for v in variables], [v.high for v in variables]])
@@ -328,9 +310,8 @@ class JobSpec(WalksSpec):
     def case_names(self) -> tuple[str, ...]:
         """Names of the scenarios, in order; with worlds, of each world in each scenario."""
         names = super().case_names
-        if self.worlds is None:
-            return names
-        return tuple(f"{name}.world-{k}" for name in names for k in range(self.worlds.count))
+        worlds = range(0 if self.worlds is None else self.worlds.count)
+        return tuple(f"{name}.world-{k}" for name in names for k in worlds) or names
 
     @property
     def measurements(self) -> tuple[Objective, ...]:
@@ -367,14 +348,13 @@ class JobSpec(WalksSpec):
         return walks if self.case is None else tuple(create_case(self.case, w) for w in walks)
 
     @property
-    def aggregation(self) -> Aggregation | None:
-        """Aggregation over worlds and scenarios; None for the plain geometric mean."""
-        worst = self.scenario_aggregate == "worst"
-        if self.worlds is None and not self.scenario_weights and not worst:
-            return None
-        names = (scenario.name for scenario in self.resolved_scenarios())
-        weights = tuple(self.scenario_weights.get(name, 1.0) for name in names)
-        return Aggregation(self.worlds, weights if self.scenario_weights else None, worst)
+    def aggregation(self) -> Aggregation:
+        """Aggregation over worlds and scenarios."""
+        weights = None
+        if self.scenario_weights:
+            names = (scenario.name for scenario in self.resolved_scenarios())
+            weights = tuple(self.scenario_weights.get(name, 1.0) for name in names)
+        return Aggregation(self.worlds, weights, self.scenario_aggregate == "worst")
 
     @property
     def further_libraries(self) -> tuple[str, ...]:
@@ -398,9 +378,8 @@ class JobSpec(WalksSpec):
         return replace(judged, fitness=np.where(infeasible, np.inf, judged.fitness))
 
     def _unconstrained(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        judged = super().judge(objectives, failed)
-        aggregation = self.aggregation
-        return judged if aggregation is None else aggregation.judged(judged.log_utilities)
+        logarithms = log_utilities(objectives, failed, self.resolved_preference())
+        return self.aggregation.judged(logarithms)
 
     def violations(self, results: Floats, failed: NDArray[np.bool_]) -> Floats | None:
         """Return by how much n designs violate the constraints, as `Spec.violations` says."""
@@ -419,11 +398,8 @@ class JobSpec(WalksSpec):
         """
         feedback = fitness
         if METHODS[self.search.name].multi_objective:
-            feedback = (
-                objective_vectors(objectives, failed)
-                if self.aggregation is None
-                else objective_vectors(objectives, failed, aggregate=self.aggregation.aggregated)
-            )
+            aggregate = self.aggregation.aggregated
+            feedback = objective_vectors(objectives, failed, aggregate=aggregate)
         violation = self.violations(objectives, failed)
         if violation is None:
             return feedback

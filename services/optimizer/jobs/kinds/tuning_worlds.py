@@ -159,6 +159,10 @@ class Aggregation:
         return logarithms.max(axis=1, keepdims=True) if self.worst else logarithms
 
 
+PLAIN: Final = Aggregation()
+"""The geometric mean over scenarios of equal weight."""
+
+
 def _bounded(perturbation: Variable, custom: Variable) -> Variable:
     """Return a perturbation with custom bounds, and its own kind and unit. Raises ValueError."""
     if custom.kind not in (perturbation.kind, "continuous"):

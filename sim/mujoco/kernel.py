@@ -21,8 +21,7 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.control_tick import PythonKernel
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout
 from gaitswarm.sim.kernel.walk import PEAKS, Coding, WalkSetup
-from gaitswarm.sim.mujoco.gears import gears_of
-from gaitswarm.sim.mujoco.ground import GROUNDS
+from gaitswarm.sim.mujoco.forces import Gears, Ground
 from gaitswarm.sim.mujoco.mjcf import Rig, Soles, Surroundings, height_field, mjcf, reach_of
 from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.robot.robot import Robot
@@ -107,8 +106,8 @@ class _Stepper:
         # Positions [m] and velocities [m/s] of the feet, by MuJoCo's sensors.
         self._of_feet: tuple[Floats, Floats] = tuple(self._d.sensordata.reshape(2, -1, 3))
         self._terrain = None if setup.terrain is None else _Terrain(m, self._d, setup.terrain)
-        self._gears = gears_of(robot, numbers, setup.start[7:])
-        self._ground = GROUNDS[robot.description.contact_law](numbers)
+        self._gears = Gears(robot, numbers, setup.start[7:])
+        self._ground = Ground(robot.description.contact_law, numbers)
         self._resistance = robot.actuators().resistance
         self._torque_constants = robot.actuators().torque
         feet = [leg.foot for leg in robot.description.legs]
@@ -144,8 +143,8 @@ class _Stepper:
         return above, np.einsum("lij,lj->li", axes, velocity), axes
 
     def motors(self) -> tuple[Floats, Floats]:
-        rotors = self._gears.memory
-        return (rotors[0], rotors[1]) if rotors else (self._angles, self._rates)
+        gears = self._gears
+        return (gears.angles, gears.rates) if gears.loose else (self._angles, self._rates)
 
     def begin(self, tick: int) -> tuple[int, float]:
         if tick % _TICKS_PER_POLL == 0 and self._should_stop():
@@ -172,8 +171,8 @@ class _Stepper:
         angles, rates, applied = self._angles, self._rates, self._applied
         disturbance = self._disturbance
         displaced = 0.0 if disturbance is None or not self._displaced else disturbance
-        actuation = self._gears.actuate(duty, angles, rates, displaced)
-        torque = actuation.torque
+        drive, on_links = self._gears.actuate(duty, angles, rates, displaced)
+        torque = on_links
         if disturbance is not None and not self._displaced:
             torque = torque + disturbance
         applied[:3] = numbers["push"] if self._shoved else 0.0
@@ -187,9 +186,9 @@ class _Stepper:
         position, velocity, axes = self._on_ground()
         if self._pushed:
             self._push_feet(position, velocity, axes)
-        dry, firm = self._gears.dry, not self._gears.memory
+        dry, firm = self._gears.dry, not self._gears.loose
         if firm and dry.torques.size:
-            motors = self._torque_constants * actuation.drive.current
+            motors = self._torque_constants * drive.current
             m.dof_frictionloss[6:] = dry.limits(motors, rates)
         (ahead_x, ahead_y), (x, y) = self._ahead.tolist(), self._velocity[:2].tolist()
         forward = (ahead_x * x + ahead_y * y) / math.hypot(ahead_x, ahead_y)
@@ -201,7 +200,7 @@ class _Stepper:
         mujoco.mj_fwdConstraint(m, d)
         mujoco.mj_Euler(m, d)
         self.diverged = not self._velocity @ self._velocity < _MAX_VELOCITY * _MAX_VELOCITY
-        self._gears.kick(actuation, timestep)
+        self._gears.kick(drive, on_links, timestep)
         self._gears.drift(timestep)
         gain = self._acceleration
         if firm and dry.torques.size:
@@ -213,7 +212,7 @@ class _Stepper:
             dry.loads = loads
         strains = np.abs(loads)
         load = float(strains.sum())
-        drive, acceleration, turn = actuation.drive, gain[:3], gain[3:6]
+        acceleration, turn = gain[:3], gain[3:6]
         current = np.abs(drive.current)
         power = drive.voltage * drive.current
         integrands = np.array(

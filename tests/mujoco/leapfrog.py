@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.mujoco.gears import Actuation, Gears
-from gaitswarm.sim.mujoco.ground import Ground
+from gaitswarm.sim.mujoco.forces import Drive, Gears, Ground
 from gaitswarm.sim.robot.robot import Robot
 from tests.mujoco.resistance import Resistance, apply_forces, feet_of
 
@@ -50,6 +49,7 @@ class Leapfrog:
     ) -> None:
         self._m, self._d, self._robot, self._gears, self._ground = m, d, robot, gears, ground
         self._resistance = Resistance(robot, ground)
+        self._viscous, self._torque_constants = robot.actuators().viscous, robot.actuators().torque
         legs = robot.description.legs
         self._bodies = [int(m.site_bodyid[m.site(leg.foot).id]) for leg in legs]
 
@@ -81,14 +81,14 @@ class Leapfrog:
         mujoco.mj_step1(m, d)
         force_on_feet, memory = self._ground.forces(*feet_of(d), timestep)
         damping = self._resistance(*feet_of(d), timestep)
-        actuation = self._gears.actuate(duty, d.qpos[7:], d.qvel[6:])
+        drive, torque = self._gears.actuate(duty, d.qpos[7:], d.qvel[6:])
         d.qfrc_applied[:6] = 0.0
-        d.qfrc_applied[6:] = actuation.torque + disturbance
+        d.qfrc_applied[6:] = torque + disturbance
         apply_forces(m, d, self._bodies, force_on_feet)
         inertia = np.zeros((m.nv, m.nv))
         mujoco.mj_fullM(m, d, inertia)
         force = d.qfrc_applied - d.qfrc_bias
-        inertia.reshape(-1)[6 * (m.nv + 1) :: m.nv + 1] += half * self._damping(actuation)
+        inertia.reshape(-1)[6 * (m.nv + 1) :: m.nv + 1] += half * self._damping(drive)
         for leg in np.flatnonzero(damping.any(axis=(1, 2))).tolist():
             jacobian, gain = self._foot(leg)
             resistance = half * jacobian.T @ damping[leg]
@@ -96,14 +96,13 @@ class Leapfrog:
             force -= resistance @ gain
         acceleration = np.linalg.solve(inertia, force)
         self._ground.memory = memory
-        own = self._gears.kick(actuation, timestep, implicit=0.5)
+        own = self._gears.kick(drive, torque, timestep, implicit=0.5)
         spins = acceleration[6:] if own is None else own
-        return self._accelerate(acceleration, actuation, spins, timestep)
+        return self._accelerate(acceleration, drive, torque, spins, timestep)
 
-    def _damping(self, actuation: Actuation) -> Floats:
+    def _damping(self, drive: Drive) -> Floats:
         """Of the motors on the links; rotors behind backlash are damped by themselves."""
-        damping = actuation.drive.damping
-        return np.zeros_like(damping) if self._gears.memory else damping
+        return np.zeros_like(drive.damping) if self._gears.loose else drive.damping
 
     def _foot(self, leg: int) -> tuple[Floats, Floats]:
         """J of a foot (3, V), and what its velocity gains without accelerations (3,) [m/s2].
@@ -120,7 +119,12 @@ class Leapfrog:
         return jacobian, gain
 
     def _accelerate(
-        self, acceleration: Floats, actuation: Actuation, spins: Floats, timestep: float
+        self,
+        acceleration: Floats,
+        drive: Drive,
+        torque: Floats,
+        spins: Floats,
+        timestep: float,
     ) -> Middle:
         d, gears, half = self._d, self._gears, 0.5 * timestep
         attitude = attitude_of(d)
@@ -130,15 +134,15 @@ class Leapfrog:
         middle = linear + half * gain
         d.qvel[:3] = attitude @ (linear + timestep * gain)
         d.qvel[3:] += timestep * acceleration[3:]
-        drive = actuation.drive
+        # Of the voltage's torque, without friction.
+        falling = drive.damping - self._viscous
         return Middle(
             velocity=middle,
             acceleration=gain + cross(angular + half * turn, middle),
             angular_acceleration=turn,
             attitude=attitude,
-            load=actuation.torque
-            - (half * self._damping(actuation) + gears.armature) * acceleration[6:],
-            current=gears.motors.current_after(drive, half * spins),
+            load=torque - (half * self._damping(drive) + gears.armature) * acceleration[6:],
+            current=drive.current - falling / self._torque_constants * (half * spins),
             voltage=drive.voltage,
         )
 

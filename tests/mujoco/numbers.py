@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.kernel.parameters import DRY_FRICTION
-from gaitswarm.sim.mujoco.gears import Gears, gears_of
-from gaitswarm.sim.mujoco.ground import GROUNDS, Ground
+from gaitswarm.sim.mujoco.forces import Gears, Ground
 from gaitswarm.sim.mujoco.mjcf import Surroundings
 from gaitswarm.sim.mujoco.model import Feet, even_drags
 from gaitswarm.sim.robot.description import DIRECTIONAL_FRICTION, Contact
@@ -34,12 +33,12 @@ def own_gears(robot: Robot, angles: Floats) -> Gears:
         },
         "backlash": actuators.backlash,
     }
-    return gears_of(robot, numbers, angles)
+    return Gears(robot, numbers, angles)
 
 
 def own_ground(robot: Robot) -> Ground:
     """The robot's law of contact with every foot's own numbers."""
-    return GROUNDS[robot.description.contact_law](_contacts(robot))
+    return Ground(robot.description.contact_law, _contacts(robot))
 
 
 def even_feet(robot: Robot, scenario: Scenario, *, points: bool = False) -> Feet:

@@ -12,8 +12,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.mujoco.ground import DeadZone, Ground, Karnopp, LinearZone, Stick
+from gaitswarm.sim.mujoco.forces import Ground
 from gaitswarm.sim.mujoco.model import model
+from gaitswarm.sim.robot.description import ContactLaw
 from gaitswarm.sim.robot.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,7 @@ class Resistance:
         limit = ground.numbers["friction"] * normal
         # A step in which friction may stop a foot must not take it as constant.
         stopping = limit * timestep * self._mobility
-        drag, further = _DRAGS[type(ground)](ground, touching, limit, slip, stopping, timestep)
+        drag, further = _DRAGS[ground.law](ground, touching, limit, slip, stopping, timestep)
         damping = np.zeros((len(normal), 3, 3))
         damping[:, 2, 2] = np.where(normal > 0.0, ground.numbers["damping"], 0.0)
         damping[:, :2, :2] = drag[:, None, None] * np.eye(2)
@@ -102,11 +103,11 @@ def _stick(
     return np.where(touching, share * damper, 0.0), np.zeros_like(limit)
 
 
-_DRAGS: Mapping[type[Ground], Callable[..., Drag]] = {
-    LinearZone: _linear_zone,
-    Karnopp: _karnopp,
-    DeadZone: _dead_zone,
-    Stick: _stick,
+_DRAGS: Mapping[ContactLaw, Callable[..., Drag]] = {
+    "linear_zone": _linear_zone,
+    "karnopp": _karnopp,
+    "dead_zone": _dead_zone,
+    "stick": _stick,
 }
 
 

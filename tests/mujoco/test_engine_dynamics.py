@@ -9,8 +9,7 @@ import pytest
 
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.parameters import pack_parameters
-from gaitswarm.sim.mujoco.gears import Gears, LooseGears
-from gaitswarm.sim.mujoco.ground import Ground, Stick
+from gaitswarm.sim.mujoco.forces import Gears, Ground
 from gaitswarm.sim.mujoco.model import model
 from gaitswarm.sim.robot import RobotChoice, RobotFiles, RobotVariant, load_robot
 from gaitswarm.sim.robot.robot import Robot
@@ -129,7 +128,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         attitude = into(d, q, v)
         mujoco.mj_step1(exported, d)
         d.qfrc_applied[:6] = 0.0
-        d.qfrc_applied[6:] = gears.actuate(duty, q[7:], v[6:]).torque + disturbance
+        d.qfrc_applied[6:] = gears.actuate(duty, q[7:], v[6:])[1] + disturbance
         forces, _ = ground.forces(*feet_of(d), 0.0)
         apply_forces(exported, d, feet, forces)
         limit = friction * forces[:, 2]
@@ -200,10 +199,10 @@ def remember_anything(
     rng: np.random.Generator, gears: Gears, ground: Ground, rates: Floats
 ) -> Floats:
     """Give gears and ground any past, with rotors inside the play and beyond; our x of it."""
-    if isinstance(gears, LooseGears):
+    if gears.loose:
         gears.angles = gears.angles + rng.uniform(-0.03, 0.03, len(rates))
         gears.rates = rates + rng.normal(size=len(rates))
-    if isinstance(ground, Stick):
+    if ground.law == "stick":
         ground.memory = rng.normal(size=ground.memory.shape) * 5e-3
     return internal_state_of(gears, ground)
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.kernel.observation import WalkLog
-from gaitswarm.sim.mujoco.gears import Gears
+from gaitswarm.sim.mujoco.forces import Gears
 from gaitswarm.sim.mujoco.model import model
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
@@ -122,7 +122,7 @@ class _Record:
 
     def add(self, tick: int, d: mujoco.MjData, gears: Gears, forces: Floats) -> None:
         self.states[tick] = d.qpos
-        self.motor_angle[tick] = gears.encoders(d.qpos[7:])
+        self.motor_angle[tick] = gears.angles if gears.loose else d.qpos[7:]
         self.foot_force[tick] = forces
 
     def trace(self, objectives: Floats) -> Trace:

@@ -19,7 +19,7 @@ from gaitswarm.sim.kernel.control_tick import InnerLoop
 from gaitswarm.sim.kernel.dynamics.drives import DryFriction
 from gaitswarm.sim.kernel.parameters import DRY_FRICTION
 from gaitswarm.sim.kernel.walk import Coding, WalkSetup
-from gaitswarm.sim.mujoco import gears
+from gaitswarm.sim.mujoco import forces
 from gaitswarm.sim.proposal.document import Proposal, walking_proposal
 from gaitswarm.sim.proposal.legs import LegHints
 from gaitswarm.sim.robot.library import listed_actuator
@@ -85,7 +85,7 @@ def test_friction_has_the_limit_of_bam(
     assert float(DryFriction(numbers, 0.0, -external).limit(motor, rate)) == pytest.approx(
         limit, rel=1e-5
     )
-    of_mujoco = gears.DryFriction({name: np.array([x]) for name, x in numbers.items()})
+    of_mujoco = forces.DryFriction({name: np.array([x]) for name, x in numbers.items()})
     of_mujoco.loads = np.array([-external])
     assert of_mujoco.limits(np.array([motor]), np.array([rate]))[0] == pytest.approx(
         limit, rel=1e-5

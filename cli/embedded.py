@@ -29,7 +29,7 @@ from gaitswarm.settings import read_settings
 
 if TYPE_CHECKING:
     from gaitswarm.cli.options import WorkerOptions
-    from gaitswarm.services.optimizer.analysis.verdict import VerdictView
+    from gaitswarm.services.optimizer.analysis.reference import VerdictView
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
     from gaitswarm.services.optimizer.jobs.job import Claim, Job

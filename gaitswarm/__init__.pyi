@@ -17,9 +17,9 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
     RankingView,
 )
+from gaitswarm.services.optimizer.analysis.reference import VerdictView
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
 from gaitswarm.services.optimizer.analysis.surface import SurfaceView
-from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,

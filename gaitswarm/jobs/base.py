@@ -591,11 +591,11 @@ class Jobs(ABC):
                 its best design, or a design as a JSON object of its variables.
         """
         from gaitswarm.services.optimizer.analysis.reference import (
+            verdict,
             with_other_reference,
             with_reference,
         )
         from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
-        from gaitswarm.services.optimizer.analysis.verdict import verdict
         from gaitswarm.services.optimizer.jobs.estimate import duration
 
         job = self._service.job(job_id)

@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     RankingRequest,
     RankingView,
 )
-from gaitswarm.services.optimizer.analysis.verdict import VerdictView
+from gaitswarm.services.optimizer.analysis.reference import VerdictView
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec

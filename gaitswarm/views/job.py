@@ -23,9 +23,9 @@ from gaitswarm.services.optimizer.jobs.job import (
     TRANSITIONS,
     Job,
     JobState,
+    ReferenceView,
     UnreadableSpec,
 )
-from gaitswarm.services.optimizer.jobs.kinds.reference import ReferenceView
 from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
 from gaitswarm.services.optimizer.jobs.spec import Spec

@@ -8,8 +8,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
+from gaitswarm.services.optimizer.jobs.job import Job, Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store import Store

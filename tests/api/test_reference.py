@@ -17,8 +17,7 @@ from gaitswarm.services.optimizer.analysis.reference import (
     with_reference,
 )
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.store import Store

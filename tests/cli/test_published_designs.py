@@ -6,8 +6,7 @@ import pytest
 
 from gaitswarm.cli.inputs import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.kinds.reference import adapted_to_job, published_study
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, adapted_to_job, published_study
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.bounds import LimitView, WidenedView
-from gaitswarm.services.optimizer.analysis.verdict import (
+from gaitswarm.services.optimizer.analysis.reference import (
     QUANTITIES,
     QuantityView,
     bounds_in_words,
@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.analysis.verdict import (
     percentage,
     relaxed,
 )
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
+from gaitswarm.services.optimizer.jobs.job import Reference
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.outcome import RESULTS
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
-from gaitswarm.services.optimizer.jobs.job import Job, JobState
-from gaitswarm.services.optimizer.jobs.kinds.reference import ReferenceView
+from gaitswarm.services.optimizer.jobs.job import Job, JobState, ReferenceView
 from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable

@@ -44,22 +44,21 @@ class DesignSpace:
         catalogue = VariableCatalogue((*required, *optional))
         fixed_values = _fixed_values(fixed, catalogue)
         if chosen is None:
-            searched = required if default is None else default
-            chosen = [variable for variable in searched if variable.name not in fixed]
-        variables: list[Variable] = []
+            chosen = [v for v in (required if default is None else default) if v.name not in fixed]
+        variables: dict[str, Variable] = {}
         for entry in chosen:
             name = entry if isinstance(entry, str) else entry.name
             if name not in catalogue:
                 raise ValueError(
                     f"variables: unknown variable {name!r}; {instead_of(name, catalogue)}"
                 )
-            if any(variable.name == name for variable in variables):
+            if name in variables:
                 raise ValueError(f"variables: {name!r} is named twice")
             if name in fixed:
                 raise ValueError(f"fixed: {name!r} is also among the variables; remove one")
-            variables.append(_checked(entry, catalogue[name]))
-        covered = {variable.name for variable in variables} | set(fixed)
-        missing = [variable.name for variable in required if variable.name not in covered]
+            variables[name] = _checked(entry, catalogue[name])
+        names = (*variables, *fixed)
+        missing = [variable.name for variable in required if variable.name not in names]
         if missing:
             raise ValueError(
                 f"variables: {', '.join(missing)} neither searched nor fixed; search or"
@@ -67,8 +66,8 @@ class DesignSpace:
             )
         if not variables:
             raise ValueError("variables: every variable is fixed; leave at least one to search")
-        names = (*(variable.name for variable in variables), *fixed)
-        return cls(tuple(variables), fixed_values, tuple(catalogue[name] for name in names))
+        searched = tuple(variables.values())
+        return cls(searched, fixed_values, tuple(catalogue[name] for name in names))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,7 +99,12 @@ class DesignSpace:
         for index, design in enumerate(designs):
             for name, value in design.items():
                 if name in held:
-                    self._check_fixed_value(f"{index}.{name}", name, value, held[name])
+                    variable = next(variable for variable in self.columns if variable.name == name)
+                    if _number(f"{index}.{name}", variable, value) != held[name]:
+                        raise ValueError(
+                            f"{index}.{name}: {value} is not the job's fixed value,"
+                            f" {variable.shown(held[name])}; omit it or change `fixed`"
+                        )
                 elif name not in self.names:
                     raise ValueError(
                         f"{index}.{name}: no variable of this job, which searches"
@@ -108,14 +112,6 @@ class DesignSpace:
                     )
             rows.append([_searched(index, v, design) for v in self.variables])
         return self.box.positions(np.array(rows).reshape(len(rows), len(self.variables)))
-
-    def _check_fixed_value(self, where: str, name: str, value: float | str, fixed: float) -> None:
-        variable = next(variable for variable in self.columns if variable.name == name)
-        if _number(where, variable, value) != fixed:
-            raise ValueError(
-                f"{where}: {value} is not the job's fixed value, {variable.shown(fixed)}; omit it"
-                " or change `fixed`"
-            )
 
     def simulated(self, designs: Floats) -> Floats:
         """Translate designs to the simulator's catalogue, with its indices of choices."""

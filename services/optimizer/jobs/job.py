@@ -1,4 +1,4 @@
-"""Jobs, claims, their states, priorities and quotas"""
+"""Jobs, claims, their states, priorities, quotas and references"""
 
 from __future__ import annotations
 
@@ -6,19 +6,23 @@ import math
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final, TypedDict
+from typing import TYPE_CHECKING, Final, Literal, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, QuotaExceeded, Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask, JournalEntry
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import (
     JobProvenance,
     ProvenanceRecords,
     changes_since,
 )
+from gaitswarm.services.optimizer.views import Finite, View
 
 if TYPE_CHECKING:
     from gaitswarm.sim.identification import Recordings
@@ -202,6 +206,64 @@ class UnreadableSpec:
     name: str = ""  # "" if unknown
     iterations: int = 0  # the current budget, 0 if unknown
     particles: int = 0  # 0 if unknown
+
+
+ReferenceKind = Literal["published", "start", "job", "design"]
+
+GIVEN: Final = "given design"
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A design that others are compared with, evaluated in the cases of a job."""
+
+    # study or preference for which it was published, `start design`, a job's id, or `GIVEN`; None
+    # if there is none
+    name: str | None
+    fitness: float | None  # by the job's measure, in double precision; None if it fails in a case
+    kind: ReferenceKind = "published"
+    results: bytes = b""  # (K, m) raw objectives, NaN where it fails, as little-endian float64
+
+    def objectives(self, cases: int) -> NDArray[np.float64]:
+        """Return the (K, m) raw objectives, columns as in the objectives of the job."""
+        return np.frombuffer(self.results, "<f8").reshape(cases, -1)
+
+    @property
+    def title(self) -> str:
+        """The design in a sentence."""
+        before = {"published": "published", "job": "the best design of job"}.get(self.kind, "the")
+        return f"{before} {self.name}"
+
+    def gain(self, fitness: float | None) -> float | None:
+        """Return the relative improvement of a fitness over the reference."""
+        if fitness is None or self.fitness is None or not self.fitness > 0.0:
+            return None
+        return 1.0 - fitness / self.fitness
+
+
+class ReferenceView(View):
+    """The design that a job's best is compared with."""
+
+    name: str = Field(
+        description="Study or preference for which it was published, `start design`, the id of a"
+        " job, or `given design`.",
+        examples=["A"],
+    )
+    kind: ReferenceKind = Field(
+        default="published",
+        description="`published`, or without one `start`: the middle of the job's bounds; on"
+        " request `job`, the best design of another one, or `design`.",
+    )
+    fitness: Finite = Field(
+        description="By the job's measure, in double precision [1]; null if it fails.",
+        examples=[20.72],
+    )
+
+    @classmethod
+    def from_reference(cls, reference: Reference | None) -> ReferenceView | None:
+        if reference is None or reference.name is None:
+            return None
+        return cls.model_validate(reference)
 
 
 @dataclass(frozen=True, slots=True)

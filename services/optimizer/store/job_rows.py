@@ -18,8 +18,7 @@ from gaitswarm.services.optimizer.errors import NotFound, Unreadable
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
+from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress, Reference, UnreadableSpec
 from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.store.tables import EXISTING, Row, jobs, notifications

@@ -31,10 +31,10 @@ from gaitswarm.services.optimizer.jobs.job import (
     JobOrder,
     JobState,
     Quota,
+    Reference,
     commanded,
     extended,
 )
-from gaitswarm.services.optimizer.jobs.kinds.reference import Reference
 from gaitswarm.services.optimizer.jobs.labels import (
     ANY_JOB,
     OWN,

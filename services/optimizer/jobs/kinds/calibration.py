@@ -165,8 +165,18 @@ def simulated_values(
 
     def of(walk: str) -> Floats:
         cases = list(of_walk[walk])
-        values = _of_all(target.quantity, objectives[:, cases], failed[:, cases])
-        values[failed[:, cases].any(axis=1)] = np.nan
+        rows, bad, quantity = objectives[:, cases], failed[:, cases], target.quantity
+        if quantity == "F":
+            preference = PREFERENCES["chapter-3"]
+            fitness = judge(rows, bad, preference).fitness.tolist()
+            merits = [figure_of_merit(value, preference) for value in fitness]
+            values = np.array([math.nan if value is None else value for value in merits])
+        elif quantity.startswith("fitness:"):
+            name: PreferenceName = quantity.removeprefix("fitness:")  # type: ignore[assignment]
+            values = judge(rows, bad, PREFERENCES[name]).fitness
+        else:
+            values = rows[:, 0, _COLUMNS[quantity]].copy()
+        values[bad.any(axis=1)] = np.nan
         return values
 
     values = of(target.walk)
@@ -174,19 +184,6 @@ def simulated_values(
         return values
     with np.errstate(divide="ignore", invalid="ignore"):
         return values / of(target.relative_to)
-
-
-def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
-    """Reduce (n, k, m) results in a walk's k scenarios to (n,) values, any after a failure."""
-    if quantity == "F":
-        preference = PREFERENCES["chapter-3"]
-        fitness = judge(rows, bad, preference).fitness.tolist()
-        merits = [figure_of_merit(value, preference) for value in fitness]
-        return np.array([math.nan if value is None else value for value in merits])
-    if quantity.startswith("fitness:"):
-        name: PreferenceName = quantity.removeprefix("fitness:")  # type: ignore[assignment]
-        return judge(rows, bad, PREFERENCES[name]).fitness
-    return rows[:, 0, _COLUMNS[quantity]].copy()
 
 
 def difference(target: Target, value: float) -> float:

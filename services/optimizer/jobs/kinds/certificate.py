@@ -431,9 +431,7 @@ class CertificateSpec(WalksSpec):
     @property
     def held_out_names(self) -> tuple[str, ...]:
         """Names of the scenarios that the design was not tuned in."""
-        names = self.held_out
-        if names is None:
-            names = tuple(scenario.name for scenario in HELD_OUT)
+        names = [s.name for s in HELD_OUT] if self.held_out is None else self.held_out
         return tuple(name for name in self.case_names if name in names)
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none

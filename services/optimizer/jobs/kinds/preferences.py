@@ -19,8 +19,7 @@ from gaitswarm.services.optimizer.jobs.kinds.certificate import (
     conditional_value_at_risk,
     world_positions,
 )
-from gaitswarm.services.optimizer.jobs.kinds.reference import nearest_design, reference_design
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, nearest_design, reference_design
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
     WEIGHED,

@@ -1,4 +1,7 @@
-"""Tuning jobs. One model serves as request body, stored JSON and argument"""
+"""Tuning jobs, and the designs that theirs are compared with
+
+One model serves as request body, stored JSON and argument.
+"""
 
 from __future__ import annotations
 
@@ -49,6 +52,7 @@ from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, RESULTS, Objective
 from gaitswarm.sim.plugins import PluginSettings
+from gaitswarm.sim.robot.variant import RobotFiles
 from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice, Scenarios
 from gaitswarm.sim.variables import Variable, split_name
 
@@ -437,3 +441,47 @@ def _gentlest_gait(searched: Sequence[Variable]) -> dict[str, float]:
         if v.name in _POSTURE or (split_name(v.name)[1] and v.name not in least)
     }
     return least | {v.name: v.high for v in searched if v.name == "fir_ms"}
+
+
+def reference_design(
+    spec: JobSpec,
+) -> tuple[str, Literal["published", "start"], Mapping[str, float]] | None:
+    """Return the design that a job's best is compared with; None with a plug-in's case."""
+    if spec.case is not None:
+        return None
+    study = None if isinstance(spec.robot, RobotFiles) else published_study(spec)
+    if study is None:
+        space = spec.design_space()
+        (values,) = space.simulated_values(space.middle)
+        return "start design", "start", values
+    published = CONTROLLERS[spec.controller].published[study]
+    return study, "published", adapted_to_job(published, spec)
+
+
+def published_study(spec: JobSpec) -> str | None:
+    """Return the name of the published design that was tuned by the job's preference."""
+    published, preference = CONTROLLERS[spec.controller].published, spec.resolved_preference()
+    names = (name for name, other in PREFERENCES.items() if other == preference)
+    return next((name for name in (*names, *published) if name in published), None)
+
+
+def adapted_to_job(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
+    space = spec.design_space()
+    searched = {variable.name for variable in space.variables}
+    conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
+    fixed = dict(space.fixed)
+    held = {name: fixed[name] for name in fixed if name in conventions or name in GAIT_CATALOGUE}
+    shared = (name for name in published if name not in GAIT_CATALOGUE or name in searched)
+    return {name: published[name] for name in shared} | held
+
+
+def nearest_design(spec: JobSpec, design: Mapping[str, float]) -> dict[str, float | str] | None:
+    """Return the design nearest to a reference, with the first scenario's gait, or None."""
+    gait, nearest = spec.resolved_scenarios()[0].model_dump(), dict[str, float | str]()
+    for variable in spec.design_space().variables:
+        value = design.get(variable.name, gait.get(variable.name))
+        if value is None:
+            return None
+        number = min(max(variable.number(value), variable.low), variable.high)
+        nearest[variable.name] = variable.shown(number)
+    return nearest

@@ -15,8 +15,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Final, get_args
 
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
-from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.iteration import Iteration
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.run.runner import run_embedded
@@ -126,14 +125,14 @@ def profile_job(
         timed = _StoreTime()
         store.observers.append(timed)
 
-        def read(done: CompletedIteration, _state: JobState) -> None:
+        def read(done: Iteration) -> None:
             before = readings[-1].evaluated if readings else 0.0
             evaluated = before + done.evaluate_seconds
             readings.append(_Reading(time.perf_counter(), evaluated, timed.seconds, timed_tasks))
 
         try:
             job, _ = store.create_job(spec)
-            run_embedded(store, observed, job.id, on_commit=read)
+            run_embedded(store, observed, job.id, on_iteration=read)
             slots = workers.slots
         finally:
             workers.close()

@@ -169,7 +169,7 @@ def run_iterations(designs: int, iterations: int = 5) -> Iterations:
         job, _ = store.create_job(spec)
         commits: list[float] = []
         run_embedded(
-            store, Free(), job.id, on_commit=lambda *_: commits.append(time.process_time())
+            store, Free(), job.id, on_iteration=lambda _: commits.append(time.process_time())
         )
         store.close()
         size = sum(file.stat().st_size for file in Path(folder).iterdir())

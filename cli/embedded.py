@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -26,12 +26,12 @@ from gaitswarm.services.runtime import (
     stop_on_signals,
 )
 from gaitswarm.settings import read_settings
+from gaitswarm.views.job import JobSummaryView
 
 if TYPE_CHECKING:
     from gaitswarm.cli.options import WorkerOptions
     from gaitswarm.services.optimizer.analysis.reference import VerdictView
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
-    from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
     from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
@@ -64,51 +64,17 @@ class Embedded:
         stop = threading.Event()
         with (
             stop_on_signals(stop),
-            show_progress(
-                Progress(
-                    particles=job.spec.optimizer.particles,
-                    iterations_planned=job.spec.iterations,
-                    evaluations_planned=job.spec.budget,
-                    iterations=job.progress.iterations,
-                    evaluations=job.progress.evaluations,
-                    least_violation=job.progress.least_violation,
-                )
-            ) as progress,
+            show_progress(Progress(JobSummaryView.from_job(job))) as progress,
         ):
-            best = job.progress.best_fitness
-
-            def committed(done: CompletedIteration, _state: JobState) -> None:
-                nonlocal best
-                if done.best is not None:
-                    _, fitness = done.best
-                    best = fitness if best is None else min(best, fitness)
-                violations = done.violations
-                least = None if violations is None else float(violations.min())
-                progress.iteration(
-                    done.iteration, len(done.fitness), best, done.evaluate_seconds, least
-                )
-
-            def followed(iteration: Iteration) -> None:
-                nonlocal best
-                best = iteration.best_so_far
-                progress.iteration(
-                    iteration.index,
-                    iteration.designs,
-                    best,
-                    iteration.evaluate_seconds,
-                    iteration.least_violation,
-                )
-
             try:
                 ended = run_embedded(
                     self.store,
                     lambda: self._opened(progress, stop),
                     job.id if claim is None else claim,
-                    on_commit=committed,
+                    on_iteration=progress.show,
                     on_retry=lambda seconds, why: progress.remark(
                         f"{why}; retrying in {seconds:.0f} s"
                     ),
-                    on_follow=followed,
                     on_news=progress.remark,
                     stop=stop,
                     accepts_changes=self._accepts_changes,
@@ -191,16 +157,15 @@ def finish(
     interrupted: bool,
     *,
     as_json: bool,
-    others: Mapping[str, JobView],
 ) -> None:
-    """Print the result, next to those of other jobs of the same problem by label."""
+    """Print the result of a job."""
     job = jobs.job(job_id)
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)
         raise KeyboardInterrupt
     verdict = jobs.verdict(job_id)
     document = {**job.model_dump(mode="json"), "verdict": verdict}
-    show(document, _report(job, verdict, jobs.place, others), as_json=as_json)
+    show(document, _report(job, verdict, jobs.place), as_json=as_json)
     if job.state is not JobState.SUCCEEDED:
         raise ended(job, jobs.place)
 
@@ -231,16 +196,13 @@ def _resume_hint(job_id: str, place: str) -> str:
     return f"to resume, run\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(job: JobView, verdict: VerdictView, place: str, others: Mapping[str, JobView]) -> Parts:
+def _report(job: JobView, verdict: VerdictView, place: str) -> Parts:
     if job.best is None and job.closest is None:
         yield "no design walks in every scenario"
     elif job.best is not None:
-        best = {name: other.best for name, other in others.items() if other.best is not None}
-        evaluations = {"best": job.best} | best
-        yield design_table(job.spec, {k: e.design for k, e in evaluations.items()})
-        yield results_table({k: e.scenarios for k, e in evaluations.items()}, job.objectives)
-        for name, evaluation in evaluations.items():
-            yield f"fitness of {name}: {worth(evaluation)}"
+        yield design_table(job.spec, {"best": job.best.design})
+        yield results_table({"best": job.best.scenarios}, job.objectives)
+        yield f"fitness of best: {worth(job.best)}"
         yield from search_line(job.best)
     if job.kind == "tuning":
         yield from verdict_lines(verdict, place)

@@ -79,27 +79,6 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     return robot
 
 
-def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
-    """Return the spec with another search method or preset, with default settings."""
-    from gaitswarm.services.optimizer.jobs.spec import with_settings
-    from gaitswarm.specs import job_spec
-
-    document = spec.model_dump(mode="json")
-    document["optimizer"] = with_settings(name, {"particles": spec.optimizer.particles})
-    document["name"] = f"{spec.name or 'job'}, by {name}"[:200]
-    return job_spec(document)
-
-
-def check_optimizer_name(name: str, option: str) -> None:
-    """Raise InvalidRequest for the option if no search method has the name."""
-    from gaitswarm.services.optimizer.jobs.spec import optimizer_settings
-
-    try:
-        optimizer_settings(name)
-    except ValueError as error:
-        raise InvalidRequest(str(error), field=option) from error
-
-
 def build_spec(options: SpecOptions) -> AnySpec:
     """Return the spec of the file, or the default spec, with options applied."""
     from gaitswarm.specs import job_spec

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.views.job import Spent, StateView
+    from gaitswarm.services.optimizer.jobs.iteration import Iteration
+    from gaitswarm.views.job import IterationView, JobSummaryView, StateView
 
 _LINE_SECONDS: Final = 2.0
 """Minimum interval of lines; the last iteration is always printed."""
@@ -27,49 +28,30 @@ _LINE_SECONDS: Final = 2.0
 class Progress:
     """Display of committed iterations, as a bar on a terminal."""
 
-    particles: int
-    iterations_planned: int
-    evaluations_planned: int
-    iterations: int = 0
-    evaluations: int = 0
-    least_violation: float | None = None
+    job: JobSummaryView  # after the iterations that were shown
     bar: Bar | None = None
     _seen: int = field(default=0, init=False)
     _seconds: float = field(default=0.0, init=False)
     _next_line: float = field(default=0.0, init=False)
 
-    @property
-    def spent(self) -> Spent:
-        from gaitswarm.views.job import budget_spent
-
-        return budget_spent(
-            self.iterations,
-            self.evaluations,
-            particles=self.particles,
-            iterations_planned=self.iterations_planned,
-            evaluations_planned=self.evaluations_planned,
-        )
-
-    def iteration(
-        self,
-        index: int,
-        designs: int,
-        best_so_far: float | None,
-        seconds: float,
-        least_violation: float | None,
-    ) -> None:
-        """Show an iteration of so many designs, evaluated in so many seconds."""
-        known = [v for v in (self.least_violation, least_violation) if v is not None]
-        self.least_violation = min(known, default=None)
-        self.iterations = index + 1
-        self.evaluations += designs
-        self._seen += designs
-        self._seconds += seconds
+    def show(self, iteration: Iteration | IterationView) -> None:
+        """Show a committed iteration."""
+        known = (self.job.least_violation, iteration.least_violation)
+        least_violation = min((value for value in known if value is not None), default=None)
+        done = {
+            "iterations": iteration.index + 1,
+            "evaluations": self.job.evaluations + iteration.designs,
+            "least_violation": least_violation,
+        }
+        job = self.job = self.job.model_copy(update=done)
+        self._seen += iteration.designs
+        self._seconds += iteration.evaluate_seconds
         rate = self._seen / max(self._seconds, 1e-9)
-        left = duration(max(0, self.evaluations_planned - self.evaluations) / rate)
-        spent, best, speed = self.spent, f"best {number(best_so_far)}", f"{rate:.1f} evaluations/s"
-        if best_so_far is None and self.least_violation:
-            best = f"no feasible design yet, least violation {self.least_violation:.3g}"
+        left = duration(max(0, job.evaluations_planned - job.evaluations) / rate)
+        spent, speed = job.spent, f"{rate:.1f} evaluations/s"
+        best = f"best {number(iteration.best_so_far)}"
+        if iteration.best_so_far is None and least_violation:
+            best = f"no feasible design yet, least violation {least_violation:.3g}"
         if self.bar is not None:
             self.bar.update(
                 self.bar.task_ids[0],
@@ -82,13 +64,11 @@ class Progress:
             )
             return
         now = time.monotonic()
-        if now < self._next_line and self.evaluations < self.evaluations_planned:
+        if now < self._next_line and job.evaluations < job.evaluations_planned:
             return
         self._next_line = now + _LINE_SECONDS
-        done = f"{spent.done}/{spent.planned} {spent.unit}"
-        if spent.unit != "iterations":
-            done = f"{index + 1} iterations, {done}"
-        note(f"{done}: {best}, {speed}, {left} left")
+        whole = "" if spent.unit == "iterations" else f"{job.iterations} iterations, "
+        note(f"{whole}{spent.done}/{spent.planned} {spent.unit}: {best}, {speed}, {left} left")
 
     def remark(self, text: str) -> None:
         """Show a line of text."""
@@ -116,7 +96,7 @@ def show_progress(progress: Progress) -> Iterator[Progress]:
         *(TextColumn(f"{{task.fields[{name}]}}") for name in ("best", "rate", "left")),
         console=console,
     )
-    spent = progress.spent
+    spent = progress.job.spent
     with progress.bar:
         unit = spent.unit.removesuffix("s")
         progress.bar.add_task(
@@ -129,20 +109,13 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
     """Follow a job until it ends; raise JobEnded unless it succeeds."""
     from gaitswarm.views.job import IterationView
 
-    job = jobs.job(job_id)
-    with show_progress(
-        Progress(job.spec.optimizer.particles, job.iterations_planned, job.evaluations_planned)
-    ) as progress:
+    # All of its iterations follow.
+    before = {"iterations": 0, "evaluations": 0, "least_violation": None}
+    with show_progress(Progress(jobs.job(job_id).model_copy(update=before))) as progress:
         last: StateView | None = None
         for event in jobs.follow(job_id):
             if isinstance(event, IterationView):
-                progress.iteration(
-                    event.index,
-                    event.designs,
-                    event.best_so_far,
-                    event.evaluate_seconds,
-                    event.least_violation,
-                )
+                progress.show(event)
             else:
                 last = event
                 reason = f", waiting: {event.waiting}" if event.waiting else ""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,35 +110,16 @@ class EvaluationTable(Table):
         measurement_names: Names of the q further quantities that were measured in a case.
     """
 
-    def __init__(self, spec: Spec, evaluations: EvaluationColumns) -> None:
-        """Make a table of a job's evaluations."""
+    def __init__(self, spec: Spec, *pieces: EvaluationColumns) -> None:
+        """Make a table of a job's evaluations, in one or several pieces."""
+        # Without any piece the columns still exist.
+        evaluations = joined([no_rows(spec), *pieces])
         super().__init__(_flat(spec, evaluations))
         self.evaluations = evaluations
         self.variables = tuple(variable.name for variable in spec.design_space().columns)
         self.cases = spec.case_names
         self.objective_names = tuple(objective.name for objective in spec.objectives)
         self.measurement_names = tuple(quantity.name for quantity in spec.measurements)
-
-    @classmethod
-    def from_pieces(cls, spec: Spec, pieces: Iterable[EvaluationColumns]) -> Self:
-        """Make a table of pieces of evaluations.
-
-        Args:
-            spec: Spec of their job.
-            pieces: The evaluations by pieces, in order.
-        """
-        # Without any piece the columns still exist.
-        return cls(spec, joined([no_rows(spec), *pieces]))
-
-    @classmethod
-    def from_parquet(cls, spec: Spec, content: bytes) -> Self:
-        """A table from the Parquet file that `encoded_table` writes.
-
-        Args:
-            spec: Spec of the job whose evaluations are in the file.
-            content: The whole file.
-        """
-        return cls(spec, decoded_table(spec, content))
 
     @property
     def iteration(self) -> NDArray[np.int64]:

@@ -68,7 +68,7 @@ from gaitswarm.specs import (
     chosen_spec,
     laid_options,
 )
-from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, encoded_table
+from gaitswarm.tables import MEDIA_TYPES, EvaluationTable, TableFormat, decoded_table, encoded_table
 from gaitswarm.views.job import (
     BestView,
     HistoryIterationView,
@@ -658,8 +658,8 @@ class Jobs(ABC):
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Return every evaluation of a job at once, as arrays."""
         spec = self.job(job_id).spec
-        read = partial(EvaluationTable.from_parquet, spec)
-        return self._decoded(read, b"".join(self.export(job_id, "parquet")))
+        content = b"".join(self.export(job_id, "parquet"))
+        return EvaluationTable(spec, self._decoded(partial(decoded_table, spec), content))
 
     @analysis(
         "POST /jobs/{job_id}/ranking",

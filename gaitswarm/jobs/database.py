@@ -32,6 +32,7 @@ from gaitswarm.views.job import HistoryIterationView, IterationView, JobView, St
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+    from gaitswarm.services.optimizer.jobs.iteration import Iteration
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
     from gaitswarm.services.optimizer.service import JobService
 
@@ -127,7 +128,7 @@ class DatabaseJobs(Jobs):
         from gaitswarm.services.optimizer.analysis.history import read_columns
 
         job = self._service.job(job_id)
-        return EvaluationTable.from_pieces(job.spec, read_columns(self._service.store, job))
+        return EvaluationTable(job.spec, *read_columns(self._service.store, job))
 
     def delete(self, job_id: str) -> None:
         """Delete a job, and remove the rows of those that can no longer be restored."""
@@ -188,10 +189,9 @@ class DatabaseJobs(Jobs):
         if isinstance(begun, str):
             taken_up(self._service, begun, accept_changes=accept_changes)
 
-        def committed(index: int) -> None:
+        def committed(iteration: Iteration) -> None:
             if on_iteration is not None:
-                after = index - 1 if index else None
-                on_iteration(next(self.iterations(job_id, after=after)))
+                on_iteration(IterationView.model_validate(iteration))
 
         try:
             with ctrl_c(stop) as interrupted, ExitStack() as stack:
@@ -209,8 +209,7 @@ class DatabaseJobs(Jobs):
                     self._service.store,
                     opened,
                     begun,
-                    on_commit=lambda done, _state: committed(done.iteration),
-                    on_follow=lambda iteration: committed(iteration.index),
+                    on_iteration=committed,
                     stop=stop,
                     accepts_changes=accept_changes,
                     cache=read_settings().cache,

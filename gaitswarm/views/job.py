@@ -125,21 +125,6 @@ class Spent:
         return f"{self.done} of {self.planned} {self.unit}"
 
 
-def budget_spent(
-    iterations: int,
-    evaluations: int,
-    *,
-    particles: int,
-    iterations_planned: int,
-    evaluations_planned: int,
-) -> Spent:
-    """Say how much of a job's budget is spent."""
-    whole = iterations <= iterations_planned and evaluations == iterations * particles
-    if particles == 0 or whole:
-        return Spent(iterations, iterations_planned, "iterations")
-    return Spent(evaluations, evaluations_planned, "designs")
-
-
 JobKind = Literal["tuning", "identification", "calibration", "certificate", "preferences"]
 
 
@@ -274,13 +259,10 @@ class JobSummaryView(View):
     @property
     def spent(self) -> Spent:
         """How much of its budget it has spent."""
-        return budget_spent(
-            self.iterations,
-            self.evaluations,
-            particles=self.particles,
-            iterations_planned=self.iterations_planned,
-            evaluations_planned=self.evaluations_planned,
-        )
+        whole = self.evaluations == self.iterations * self.particles
+        if self.particles == 0 or (whole and self.iterations <= self.iterations_planned):
+            return Spent(self.iterations, self.iterations_planned, "iterations")
+        return Spent(self.evaluations, self.evaluations_planned, "designs")
 
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:

@@ -65,7 +65,7 @@ def test_a_job_stopped_half_way_ends_with_the_same_bits(store: Store) -> None:
     stop = threading.Event()
     evaluator = open_evaluator("in-process", cpus=1)
     try:
-        run_embedded(store, evaluator, job.id, stop=stop, on_commit=lambda *_: stop.set())
+        run_embedded(store, evaluator, job.id, stop=stop, on_iteration=lambda _: stop.set())
         assert store.job(job.id).progress.iterations < wanted.iterations
         run_embedded(store, evaluator, job.id)
     finally:

@@ -159,36 +159,6 @@ def test_the_report_ends_with_a_verdict_against_the_published_optimum(
     assert re.search(r"simulated on threads: \d+ \(--evaluator ray runs it on Ray\)", result.err)
 
 
-def test_the_report_compares_another_method_with_the_same_budget(
-    gaitswarm: Gaitswarm, small_spec: Path, db: Path
-) -> None:
-    """A job of the same database, which is found again when it is asked for again."""
-    command = (
-        "optimize", "--spec", small_spec, "--db", db, "--evaluator", "in-process",
-        "--compare-optimizer", "random",
-    )  # fmt: skip
-    result = gaitswarm(*command)
-    assert result.code == 0, result.err
-    assert gaitswarm(*command).code == 0
-    jobs = gaitswarm("list", "--db", db, "--json").json
-    (second,) = [job for job in jobs if job["optimizer"] == "random"]
-    first = next(job for job in jobs if job["optimizer"] != "random")
-    assert second["evaluations"] == first["evaluations"]
-    for name, job in {"best": first, "random": second}.items():
-        assert f"fitness of {name}: {job['best_fitness']:.4g}" in result.out
-
-
-def test_an_unknown_method_to_compare_with_is_refused_before_anything_runs(
-    gaitswarm: Gaitswarm, small_spec: Path, db: Path
-) -> None:
-    result = gaitswarm(
-        "optimize", "--spec", small_spec, "--db", db, "--compare-optimizer", "no-such-method"
-    )
-    assert result.code == 2
-    assert "compare-optimizer: unknown optimizer 'no-such-method'" in result.err
-    assert not db.exists()
-
-
 def test_resuming_a_finished_job_prints_it_again(gaitswarm: Gaitswarm, finished: Finished) -> None:
     result = gaitswarm("optimize", "--resume", finished.id, "--db", finished.db, "--json")
     assert result.code == 0

@@ -15,7 +15,7 @@ import numpy as np
 
 from gaitswarm import optimize
 from gaitswarm.services.optimizer.jobs.constraints import no_worse_than
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
 from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
@@ -117,11 +117,11 @@ def run_demo(most: int | None) -> tuple[list[DemoIteration], Evaluation]:
         enough = threading.Event()
         job, _ = store.create_job(DEMO)
 
-        def stop_after(done: object, state: object) -> None:
-            if store.job(job.id).progress.iterations == most:
+        def stop_after(iteration: Iteration) -> None:
+            if iteration.index + 1 == most:
                 enough.set()
 
-        run_embedded(store, evaluator, job.id, on_commit=stop_after, stop=enough)
+        run_embedded(store, evaluator, job.id, on_iteration=stop_after, stop=enough)
         done = store.job(job.id).progress.iterations
         iterations = [_iteration(store.evaluations(job.id, index)) for index in range(done)]
         best = store.best(job.id)

@@ -13,7 +13,7 @@ import pytest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
-from gaitswarm.tables import EvaluationTable, Table, encoded_table
+from gaitswarm.tables import EvaluationTable, Table, decoded_table, encoded_table
 
 SPEC = JobSpec(controller="pi", scenarios=("normal-fast", "2"), preference="C")
 CASES = ("normal-fast", "normal-slow")
@@ -43,7 +43,7 @@ def columns() -> EvaluationColumns:
 
 @pytest.fixture
 def table(columns: EvaluationColumns) -> EvaluationTable:
-    return EvaluationTable.from_pieces(SPEC, [columns])
+    return EvaluationTable(SPEC, columns)
 
 
 def same_bits(left: np.ndarray, right: np.ndarray) -> bool:
@@ -74,13 +74,13 @@ def test_what_does_not_exist_is_nan_and_never_infinite(table: EvaluationTable) -
 
 def test_pieces_make_one_table(table: EvaluationTable, columns: EvaluationColumns) -> None:
     pieces = [columns.rows(slice(0, 5)), columns.rows(slice(5, 10))]
-    assert EvaluationTable.from_pieces(SPEC, pieces).to_arrow().equals(table.to_arrow())
+    assert EvaluationTable(SPEC, *pieces).to_arrow().equals(table.to_arrow())
 
 
 def test_a_job_without_evaluations_has_the_same_columns_without_rows(
     table: EvaluationTable,
 ) -> None:
-    empty = EvaluationTable.from_pieces(SPEC, [])
+    empty = EvaluationTable(SPEC)
     assert len(empty) == 0
     assert empty.keys() == table.keys()
     assert empty.to_arrow().schema == table.to_arrow().schema
@@ -111,7 +111,7 @@ def test_parquet_brings_the_same_table_back(
     table: EvaluationTable, columns: EvaluationColumns
 ) -> None:
     content = b"".join(encoded_table("parquet", SPEC, [columns]))
-    read = EvaluationTable.from_parquet(SPEC, content)
+    read = EvaluationTable(SPEC, decoded_table(SPEC, content))
     assert read.to_arrow().equals(table.to_arrow())
     assert same_bits(read.designs, columns.designs)
 

@@ -91,22 +91,17 @@ class Reports:
     """Calls of an embedded run's callbacks."""
 
     def __init__(self) -> None:
-        self.committed: list[int] = []
-        self.followed: list[int] = []
+        self.iterations: list[int] = []
         self.news: list[str] = []
         self.any_news = threading.Event()
 
     def callbacks(self) -> dict[str, Any]:
-        def commit(done: CompletedIteration, _: JobState) -> None:
-            self.committed.append(done.iteration)
-
         def news(sentence: str) -> None:
             self.news.append(sentence)
             self.any_news.set()
 
         return {
-            "on_commit": commit,
-            "on_follow": lambda iteration: self.followed.append(iteration.index),
+            "on_iteration": lambda iteration: self.iterations.append(iteration.index),
             "on_news": news,
         }
 
@@ -121,7 +116,7 @@ def test_a_job_that_was_submitted_for_itself_runs_to_its_end(
 ) -> None:
     job = run_embedded(store, FormulaEvaluator(), submitted(store), **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert (reports.committed, reports.followed, reports.news) == (ALL, [], [])
+    assert (reports.iterations, reports.news) == (ALL, [])
 
 
 def test_a_job_is_kept_while_its_workers_are_opened_however_long_that_takes(
@@ -182,7 +177,7 @@ def test_a_job_that_another_process_runs_is_followed_to_its_end(
     with running(store, claim, after=reports.any_news):
         job = run_embedded(store, no_workers, claim.job.id, **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert (reports.committed, reports.followed) == ([], ALL)
+    assert reports.iterations == ALL
     assert len(reports.news) == 1 and "another process runs" in reports.news[0]
 
 
@@ -195,7 +190,7 @@ def test_following_begins_after_the_iterations_that_the_caller_knows_of(
     assert claim is not None and claim.job.progress.iterations == 1
     with running(store, claim, after=reports.any_news):
         run_embedded(store, no_workers, claim.job.id, followed_iterations=0, **reports.callbacks())
-    assert reports.followed == ALL
+    assert reports.iterations == ALL
 
 
 def test_a_job_released_by_another_process_continues_here(store: Store, reports: Reports) -> None:
@@ -215,7 +210,7 @@ def test_a_job_released_by_another_process_continues_here(store: Store, reports:
     job = run_embedded(store, FormulaEvaluator(), claim.job.id, **reports.callbacks())
     another.join()
     assert job.state is JobState.SUCCEEDED
-    assert (reports.followed, reports.committed) == (ALL[:2], ALL[2:])
+    assert reports.iterations == ALL
     assert "continuing it here" in reports.news[-1]
 
 
@@ -249,7 +244,7 @@ def test_a_job_lost_to_another_process_is_followed_there_and_nothing_is_reported
         here.join()
     assert [job.state for job in ended] == [JobState.SUCCEEDED]
     assert "lost its lease" in reports.news[0]
-    assert (reports.committed, reports.followed) == ([], ALL)
+    assert reports.iterations == ALL
 
 
 class Asleep(FormulaEvaluator):
@@ -277,7 +272,7 @@ def test_a_job_ended_unnoticed_by_another_process_is_reported_to_its_end(
 ) -> None:
     job = run_embedded(store, Asleep(store, clock), submitted(store), **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert (reports.committed, reports.followed) == ([], ALL)
+    assert reports.iterations == ALL
     assert len(reports.news) == 1 and "lost its lease" in reports.news[0]
 
 
@@ -301,7 +296,9 @@ def test_a_job_that_is_not_under_way_is_returned_as_it_is(store: Store, command:
 def test_a_run_that_is_asked_to_stop_leaves_the_job_queued(store: Store) -> None:
     stop = threading.Event()
     claim = submitted(store)
-    job = run_embedded(store, FormulaEvaluator(), claim, on_commit=lambda *_: stop.set(), stop=stop)
+    job = run_embedded(
+        store, FormulaEvaluator(), claim, on_iteration=lambda _: stop.set(), stop=stop
+    )
     assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
 
 
@@ -311,7 +308,7 @@ def test_a_job_whose_process_was_killed_with_its_clock_ahead_is_taken_over(
     with clock_ahead(clock, 86400.0):
         claim = held_by_another(store)
     job = run_embedded(store, FormulaEvaluator(), claim.job.id, **reports.callbacks())
-    assert (job.state, reports.committed) == (JobState.SUCCEEDED, ALL)
+    assert (job.state, reports.iterations) == (JobState.SUCCEEDED, ALL)
 
 
 def test_a_run_ends_when_its_database_file_is_removed(store: Store, tmp_path: Path) -> None:
@@ -319,7 +316,7 @@ def test_a_run_ends_when_its_database_file_is_removed(store: Store, tmp_path: Pa
         (tmp_path / "jobs.db").unlink()
 
     with pytest.raises(StoreReplaced, match="restart"):
-        run_embedded(store, FormulaEvaluator(), submitted(store), on_commit=remove)
+        run_embedded(store, FormulaEvaluator(), submitted(store), on_iteration=remove)
 
 
 def test_a_run_that_is_asked_to_stop_before_it_begins_leaves_the_job_queued(store: Store) -> None:

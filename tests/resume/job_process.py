@@ -34,7 +34,12 @@ def main(url: str, job_id: str, kind: str, connection: Connection) -> None:
     store = open_store(url)
     # On Ray from the first walk on, however short the job is.
     evaluator = RayEvaluator(cpus=2) if kind == "ray" else open_evaluator("in-process", cpus=2)
-    run_embedded(store, evaluator, job_id, on_commit=lambda _, state: connection.send(str(state)))
+    run_embedded(
+        store,
+        evaluator,
+        job_id,
+        on_iteration=lambda _: connection.send(str(store.job(job_id).state)),
+    )
     evaluator.close()
     store.close()
 

@@ -12,8 +12,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
-from gaitswarm.services.optimizer.errors import GaitswarmError, LeaseLost, NotFound
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
+from gaitswarm.services.optimizer.errors import (
+    GaitswarmError,
+    LeaseLost,
+    NotFound,
+    StoreUnavailable,
+)
+from gaitswarm.services.optimizer.jobs.iteration import Iteration
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.listing import Page, every
 from gaitswarm.services.optimizer.jobs.provenance import optimizer_digest
@@ -21,7 +26,6 @@ from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from gaitswarm.services.optimizer.run.execution import (
     Heartbeat,
-    OnCommit,
     OnRetry,
     RunContext,
     run_claim,
@@ -213,8 +217,8 @@ class Runner:
 EMBEDDED_LEASE_SECONDS: Final = 5.0
 """Short, because a user waits for its end when the previous process was killed."""
 
-OnFollow = Callable[[Iteration], None]
-"""Called for an iteration stored by another process."""
+OnIteration = Callable[[Iteration], None]
+"""Called for each committed iteration, by this process or another one, once and in order."""
 
 OnNews = Callable[[str], None]
 """Called with a message for people when another process takes or releases the job."""
@@ -241,9 +245,8 @@ def run_embedded(  # noqa: C901 - one loop
     evaluator: Evaluator | Callable[[], Evaluator],
     job: str | Claim,
     *,
-    on_commit: OnCommit | None = None,
+    on_iteration: OnIteration | None = None,
     on_retry: OnRetry | None = None,
-    on_follow: OnFollow | None = None,
     on_news: OnNews | None = None,
     stop: threading.Event | None = None,
     accepts_changes: bool = False,
@@ -259,12 +262,6 @@ def run_embedded(  # noqa: C901 - one loop
     seen = (latest.progress.iterations if followed_iterations is None else followed_iterations) - 1
     tell, news, following = on_news or (lambda _: None), _HELD, False
 
-    def committed(done: CompletedIteration, state: JobState) -> None:
-        nonlocal seen
-        seen = done.iteration
-        if on_commit is not None:
-            on_commit(done, state)
-
     def later(_: object) -> Page[Iteration]:
         return store.iterations(job_id, after=seen)
 
@@ -272,8 +269,13 @@ def run_embedded(  # noqa: C901 - one loop
         nonlocal seen
         for iteration in every(later):
             seen = iteration.index
-            if on_follow is not None:
-                on_follow(iteration)
+            if on_iteration is not None:
+                on_iteration(iteration)
+
+    def committed(*_: object) -> None:
+        # One that cannot be read now is reported with the next.
+        with suppress(StoreUnavailable):
+            catch_up()
 
     while latest.state in _UNDER_WAY and not stop.is_set():
         claim = claim or store.claim(runner, lease_seconds=EMBEDDED_LEASE_SECONDS, job_id=job_id)

@@ -31,9 +31,8 @@ class GaitView(View):
 
     name: GaitName = Field(description="Name, as scenarios have it.", examples=["crawl"])
     description: str = Field(description="What it is, with its source.")
-    legs: list[int] = Field(
-        description="Numbers of legs that it is defined for; any if empty.", examples=[[4]]
-    )
+    legs: list[int] = Field(examples=[[4]])
+    """Numbers of legs that it is defined for; any if empty."""
     suits: bool = Field(description="Whether it is defined for the robot's legs.")
     lags: dict[str, float] = Field(
         default_factory=dict,
@@ -41,25 +40,20 @@ class GaitView(View):
         " one's [1]; empty if the gait is not defined for the robot.",
         examples=[{"left_rear": 0.0, "left_front": 0.25}],
     )
-    planned: PlannedGaitView | None = Field(
-        default=None,
-        description="Duty factor and static stability in the scenario; null for a gait that"
-        " is not defined for the robot, or out of its legs' reach.",
-    )
-    support: dict[str, str] = Field(
-        default_factory=dict,
-        description="Footfall diagram: by leg one cycle in 40 columns, # where the foot stands and"
-        " . where it swings.",
-    )
+    planned: PlannedGaitView | None = None
+    """Duty factor and static stability in the scenario; null for a gait that is not defined for the
+    robot, or out of its legs' reach."""
+    support: dict[str, str] = Field(default_factory=dict)
+    """Footfall diagram: by leg one cycle in 40 columns, # where the foot stands and . where it
+    swings."""
 
 
 class GaitsView(View):
     """Gaits for a robot."""
 
     robot: str = Field(description="Name of the robot.", examples=["quadruped"])
-    scenario: str = Field(
-        description="Scenario that provides posture, stride and sway.", examples=["crawl"]
-    )
+    scenario: str = Field(examples=["crawl"])
+    """Scenario that provides posture, stride and sway."""
     items: list[GaitView] = Field(description="The robot's own gait first.")
 
 

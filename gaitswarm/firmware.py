@@ -32,12 +32,9 @@ class FirmwareRequest(ScenariosRequest):
     """A design and the scenarios whose trajectories and simulations its firmware includes."""
 
     label: Line = Field(default="design", max_length=200, description="Display name of the design.")
-    table_bits: tuple[int, int] | None = Field(
-        default=None,
-        description="Of the indices of angle error and current in a fuzzy controller's table, in"
-        " place of 10 and 6; simulations use this table.",
-        examples=[[8, 6]],
-    )
+    table_bits: tuple[int, int] | None = Field(default=None, examples=[[8, 6]])
+    """Of the indices of angle error and current in a fuzzy controller's table, in place of 10 and
+    6; simulations use this table."""
 
     @property
     def walked_seconds(self) -> float:
@@ -84,9 +81,8 @@ class FirmwareTrajectoryView(View):
     scenario: str = Field(description="Name of the scenario.", examples=["normal-fast"])
     rows: int = Field(description="Rows of the table, 500 a second.", examples=[755])
     columns: int = Field(description="Angles of a row; joints that move alike share one.")
-    repeats_from: int | None = Field(
-        description="Row that follows the last one; null if the trajectory does not repeat."
-    )
+    repeats_from: int | None
+    """Row that follows the last one; null if the trajectory does not repeat."""
     bytes: int = Field(description="Memory of all joints, eq. 5.1 [B].", examples=[9060])
     bytes_of_a_leg: int = Field(description="Memory of one leg's joints [B].", examples=[4530])
 
@@ -121,18 +117,14 @@ class FirmwareView(View):
     folder: str | None = Field(default=None, description="Its path; null on a server.")
     label: str = Field(description="Display name of the design.", examples=["published A"])
     controller: ControllerName = Field(description="Of the design.", examples=["fuzzy-pi"])
-    design: dict[str, float] = Field(
-        description="Values by variable; of a categorical one the index of a choice.",
-        examples=[{"P": 0.454, "I": 0.147}],
-    )
-    files: dict[str, int] = Field(
-        description="Size of every file [B].", examples=[{"tick.c": 4600}]
-    )
+    design: dict[str, float] = Field(examples=[{"P": 0.454, "I": 0.147}])
+    """Values by variable; of a categorical one the index of a choice."""
+    files: dict[str, int] = Field(examples=[{"tick.c": 4600}])
+    """Size of every file [B]."""
     tables: list[FirmwareTableView] = Field(description="Fuzzy tables; none for P, PI, PID.")
-    table_difference: dict[str, Finite] | None = Field(
-        description="By objective, largest relative difference from simulations with the table of"
-        " 10 x 6 bits [1]; null with that table."
-    )
+    table_difference: dict[str, Finite] | None
+    """By objective, largest relative difference from simulations with the table of 10 x 6 bits [1];
+    null with that table."""
     trajectories: list[FirmwareTrajectoryView] = Field(description="By scenario.")
     walks: list[FirmwareWalkView] = Field(description="By scenario.")
     samples: int = Field(description="Of all simulations.", examples=[280800])
@@ -247,12 +239,8 @@ def write_firmware(
 class TrajectoriesRequest(ScenariosRequest):
     """A design whose gaits are written for servos."""
 
-    rate: float = Field(
-        default=50.0,
-        ge=1.0,
-        le=500.0,
-        description="Rows a second, changed so that a cycle has a whole number of them [Hz].",
-    )
+    rate: float = Field(default=50.0, ge=1.0, le=500.0)
+    """Rows a second, changed so that a cycle has a whole number of them [Hz]."""
     held: bool = Field(default=True, description="Whether held joints have columns as well.")
 
     def setpoints(self) -> dict[str, Setpoints]:
@@ -275,9 +263,8 @@ class ScenarioTrajectoryView(View):
     rows: dict[str, int] = Field(description="By part: start, cycle and stop.")
     fastest_joint: str = Field(description="The joint that turns fastest.")
     largest_speed: float = Field(description="Its largest speed [rad/s].")
-    too_fast: dict[str, tuple[float, float]] = Field(
-        description="By joint that cannot follow, its speed and its motor's without load [rad/s]."
-    )
+    too_fast: dict[str, tuple[float, float]]
+    """By joint that cannot follow, its speed and its motor's without load [rad/s]."""
 
 
 class TrajectoriesView(View):

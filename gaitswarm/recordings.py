@@ -25,10 +25,8 @@ from gaitswarm.sim.validation import Verdict, compare_synchronised
 class RecordingBase(View):
     """A recorded walk."""
 
-    id: str = Field(
-        description="Identifier, as in `recordings` of a job.",
-        examples=["0f343b0931126a20f133d67c2b018a3b"],
-    )
+    id: str = Field(examples=["0f343b0931126a20f133d67c2b018a3b"])
+    """Identifier, as in `recordings` of a job."""
     scenario: str = Field(description="Name of its scenario.", examples=["normal-fast"])
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
     joints: int = Field(description="Joints whose currents were measured.", examples=[18])
@@ -41,14 +39,11 @@ class RecordingView(RecordingBase):
     """A recorded walk without its numbers."""
 
     walk: Scenario = Field(description="Its scenario in full.")
-    design: dict[str, float] = Field(
-        description="Value of each of the controller's variables, and of any gait variable; of a"
-        " categorical one the index of a choice.",
-        examples=[{"P": 0.454, "I": 0.147}],
-    )
-    mean_current: float = Field(
-        description="Mean over rows and joints of the absolute current [A].", examples=[0.14]
-    )
+    design: dict[str, float] = Field(examples=[{"P": 0.454, "I": 0.147}])
+    """Value of each of the controller's variables, and of any gait variable; of a categorical one
+    the index of a choice."""
+    mean_current: float = Field(examples=[0.14])
+    """Mean over rows and joints of the absolute current [A]."""
     peak_current: float = Field(description="Largest of these currents [A].", examples=[0.85])
 
     @classmethod
@@ -96,24 +91,20 @@ class MeasuredWalkView(View):
     seconds: float = Field(description="Length of the log [s].", examples=[4.6])
     signals: list[SignalView] = Field(description="Every quantity that a log may have.")
     offset: float = Field(description="Begin of the walk in the log, from the simulated one's [s].")
-    cycles: int = Field(
-        description="Recorded cycles: whole ones that log and simulation share.", examples=[3]
-    )
+    cycles: int = Field(examples=[3])
+    """Recorded cycles: whole ones that log and simulation share."""
     cycle_time: float = Field(description="Time of a walking cycle [s].", examples=[1.5])
-    correlation: float = Field(
-        description="Of the log's desired angles with the simulated ones, 1 for the same gait.",
-        examples=[0.9998],
-    )
+    correlation: float = Field(examples=[0.9998])
+    """Of the log's desired angles with the simulated ones, 1 for the same gait."""
     verdict: Verdict = Field(description="Whether the log validates the model (thesis 2.3).")
 
 
 class MeasuredWalkRequest(DesignRequest):
     """A measured log, and the design and scenario that it was measured with."""
 
-    scenario: ScenarioChoice = Field(
-        description="The walk: name or number of a preset (see /v1/scenarios), or your own, with as"
-        " many cycles as were measured."
-    )
+    scenario: ScenarioChoice
+    """The walk: name or number of a preset (see /v1/scenarios), or your own, with as many cycles as
+    were measured."""
     log: str = Field(
         min_length=1,
         description="Text of the log: CSV with 500 rows a second and the unit in every heading, in"

@@ -45,17 +45,10 @@ MOST_POSES: Final = 1_000_000
 class ReplayRequest(WorldRequest):
     """A design and the scenario to replay."""
 
-    scenario: ScenarioChoice = Field(
-        default="normal-fast",
-        description="Name or number of a preset (see /v1/scenarios), or your own.",
-        examples=["normal-fast"],
-    )
-    rate: float = Field(
-        default=50.0,
-        ge=1.0,
-        le=CONTROL_RATE,
-        description="Frames a second; each is the nearest tick of 2 ms, whose time is exact [Hz].",
-    )
+    scenario: ScenarioChoice = Field(default="normal-fast", examples=["normal-fast"])
+    """Name or number of a preset (see /v1/scenarios), or your own."""
+    rate: float = Field(default=50.0, ge=1.0, le=CONTROL_RATE)
+    """Frames a second; each is the nearest tick of 2 ms, whose time is exact [Hz]."""
 
 
 Vector = tuple[float, float, float]
@@ -65,22 +58,19 @@ class MovingRobotView(View):
     """The robot's links and shapes."""
 
     name: str = Field(description="Name of the robot.", examples=["szabadka2"])
-    urdf: str | None = Field(
-        description="SHA-256 of its robot.urdf, which identifies its meshes; null for a shipped"
-        " robot, which has none."
-    )
+    urdf: str | None
+    """SHA-256 of its robot.urdf, which identifies its meshes; null for a shipped robot, which has
+    none."""
     links: list[VisibleLink] = Field(description="All links, parents first; the body is the first.")
     joints: list[str] = Field(description="Joints in the order of channels.")
     legs: list[str] = Field(description="Legs in the order of channels.")
     mass: float = Field(description="Mass without load [kg].", examples=[4.05])
-    torque_limits: list[float] = Field(
-        description="By joint, torque at the joint: nominal one of a gearhead, or largest one of a"
-        " torque-controlled actuator [N m]."
-    )
-    current_limits: list[float] = Field(
-        description="By joint: stall current of a DC motor at the battery's voltage, or the current"
-        " of a torque-controlled actuator's largest torque [A]."
-    )
+    torque_limits: list[float]
+    """By joint, torque at the joint: nominal one of a gearhead, or largest one of a
+    torque-controlled actuator [N m]."""
+    current_limits: list[float]
+    """By joint: stall current of a DC motor at the battery's voltage, or the current of a
+    torque-controlled actuator's largest torque [A]."""
 
 
 class HeightsView(View):
@@ -88,22 +78,19 @@ class HeightsView(View):
 
     x: list[float] = Field(description="Places of the rows [m].", examples=[[-0.5, 0.5]])
     y: list[float] = Field(description="Places of a row's heights [m].", examples=[[-0.5, 0.5]])
-    z: list[list[float]] = Field(
-        description="Heights by row [m].", examples=[[[0.0, 0.01], [0.0, 0.02]]]
-    )
+    z: list[list[float]] = Field(examples=[[[0.0, 0.01], [0.0, 0.02]]])
+    """Heights by row [m]."""
 
 
 class GroundView(View):
     """The ground; the world's z axis is normal to it, so gravity is tilted."""
 
     slope_deg: float = Field(description="Inclination, up positive [deg].", examples=[10.0])
-    slope_direction_deg: float = Field(
-        description="Where it rises, from straight ahead towards the left [deg].", examples=[0.0]
-    )
+    slope_direction_deg: float = Field(examples=[0.0])
+    """Where it rises, from straight ahead towards the left [deg]."""
     normal: Vector = Field(default=(0.0, 0.0, 1.0), description="Its normal in the world [1].")
-    heights: HeightsView | None = Field(
-        default=None, description="Its heights; null if it is flat."
-    )
+    heights: HeightsView | None = None
+    """Its heights; null if it is flat."""
 
 
 class ChannelView(View):
@@ -126,16 +113,12 @@ class ReplayHeaderView(View):
     duration: float = Field(description="Simulated time, up to a fall if there was one [s].")
     status: StatusName = Field(description="Status of the simulation; only `ok` is a success.")
     explanation: str = Field(description="The status in a sentence, with what to do about it.")
-    objectives: dict[str, float | None] = Field(
-        description="Raw objectives f1..f6 of table 4.1 by name; null after a failure.",
-        examples=[{"torque": 8.71}],
-    )
-    objective_units: dict[str, str] = Field(
-        description="Unit of each of them.", examples=[{"torque": "N m"}]
-    )
-    scenario: Scenario = Field(
-        description="The scenario in full, with the gait parameters of the design."
-    )
+    objectives: dict[str, float | None] = Field(examples=[{"torque": 8.71}])
+    """Raw objectives f1..f6 of table 4.1 by name; null after a failure."""
+    objective_units: dict[str, str] = Field(examples=[{"torque": "N m"}])
+    """Unit of each of them."""
+    scenario: Scenario
+    """The scenario in full, with the gait parameters of the design."""
     robot: MovingRobotView = Field(description="Links and shapes of the robot.")
     ground: GroundView = Field(description="The ground.")
     gravity: Vector = Field(description="In the world [m/s2].", examples=[[0.0, 0.0, -9.81]])

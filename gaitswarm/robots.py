@@ -132,12 +132,10 @@ class CheckedLegView(View):
     foot: str = Field(description="Link or fixed joint at its end.")
     length: float = Field(description="From the first joint to the foot, stretched [m].")
     mass: float = Field(description="Of its three links with what is fixed to them [kg].")
-    reach: float = Field(
-        description="How far the foot gets below the highest hip within the joints' limits [m]."
-    )
-    points: list[tuple[float, float, float]] = Field(
-        description="Where its joints and its foot are in the body's frame when it stands [m]."
-    )
+    reach: float
+    """How far the foot gets below the highest hip within the joints' limits [m]."""
+    points: list[tuple[float, float, float]]
+    """Where its joints and its foot are in the body's frame when it stands [m]."""
 
 
 class StandingStillView(View):
@@ -154,24 +152,19 @@ class RobotCheckView(View):
 
     name: str = Field(description="Of the robot.")
     mass: float = Field(description="Without load [kg].")
-    body_mass: float = Field(
-        description="Of the body with all that is held or fixed to it, without legs [kg]."
-    )
+    body_mass: float
+    """Of the body with all that is held or fixed to it, without legs [kg]."""
     joints: int = Field(description="That move.")
     legs: list[CheckedLegView] = Field(description="In the order of robot.toml.")
     held: dict[str, float] = Field(description="Joints of no leg, each with its angle [rad].")
-    centre_of_mass: tuple[float, float, float] = Field(
-        description="In the body's frame when it stands [m]."
-    )
+    centre_of_mass: tuple[float, float, float]
+    """In the body's frame when it stands [m]."""
     standing: StandingStillView = Field(description="How it stands.")
-    guesses: list[str] = Field(
-        description="Guesses of `robot init` that are still in robot.toml, one sentence each."
-    )
+    guesses: list[str]
+    """Guesses of `robot init` that are still in robot.toml, one sentence each."""
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")
-    parameters: list[Variable] = Field(
-        default_factory=list,
-        description="What an identification or calibration may fit of it, with bounds.",
-    )
+    parameters: list[Variable] = Field(default_factory=list)
+    """What an identification or calibration may fit of it, with bounds."""
 
 
 _SECONDS: Final = 1.0
@@ -466,21 +459,15 @@ class RobotDraftRequest(Request):
         f" {MOST_LINKS} links and as many joints at most, {MOST_ELEMENTS} elements at most, no"
         " document type.",
     )
-    actuator: ActuatorChoice = Field(
-        default="auto",
-        description="Kind of its actuators: DC motors with gearheads, or torque-controlled ones;"
-        " `auto` decides by the torques and rates of the URDF.",
-    )
-    up: Axis | None = Field(
-        default=None,
-        description="Axis of the URDF's first link that points up; null for z, which is refused if"
-        " the legs speak against it.",
-    )
-    forward: Axis | None = Field(
-        default=None,
-        description="Axis of its first link that points ahead, at right angles to `up`; null for x,"
-        " with a warning if the legs speak against it.",
-    )
+    actuator: ActuatorChoice = "auto"
+    """Kind of its actuators: DC motors with gearheads, or torque-controlled ones; `auto` decides by
+    the torques and rates of the URDF."""
+    up: Axis | None = None
+    """Axis of the URDF's first link that points up; null for z, which is refused if the legs speak
+    against it."""
+    forward: Axis | None = None
+    """Axis of its first link that points ahead, at right angles to `up`; null for x, with a warning
+    if the legs speak against it."""
 
     locks: dict[str, float] = Field(
         default_factory=dict,
@@ -496,12 +483,8 @@ class RobotDraftRequest(Request):
         " wildcards; others are where the links' shapes suggest.",
         examples=[{"FL_calf": [0.0, 0.0, -0.2]}],
     )
-    mass: float | None = Field(
-        default=None,
-        gt=0.0,
-        le=10_000.0,
-        description="Mass of the robot [kg]; null for the text's, unless that is a placeholder.",
-    )
+    mass: float | None = Field(default=None, gt=0.0, le=10_000.0)
+    """Mass of the robot [kg]; null for the text's, unless that is a placeholder."""
     actuators: dict[str, str] = Field(
         default_factory=dict,
         max_length=MOST_LINKS,
@@ -516,14 +499,12 @@ class RobotDraftView(View):
 
     name: str = Field(description="Of the robot.", examples=["a1"])
     toml: str = Field(description="Text of robot.toml, with a comment on every guess.")
-    urdf: str = Field(
-        description="Text of robot.urdf: as it was sent or converted, with a frame at the end of"
-        " every leg whose foot is no link."
-    )
-    job: dict[str, Any] = Field(
-        description="Fields of a job of this robot, unless it says otherwise: two scenarios, the"
-        " controller, bounds where they follow from the robot, the preference."
-    )
+    urdf: str
+    """Text of robot.urdf: as it was sent or converted, with a frame at the end of every leg whose
+    foot is no link."""
+    job: dict[str, Any]
+    """Fields of a job of this robot, unless it says otherwise: two scenarios, the controller,
+    bounds where they follow from the robot, the preference."""
     guesses: list[str] = Field(description="Guesses to check, one sentence each.")
 
 
@@ -546,14 +527,10 @@ class MeshFileView(View):
     """A mesh that a robot's URDF names, and whether this server has its file."""
 
     name: str = Field(description="As the URDF has it.", examples=["meshes/hip.stl"])
-    format: MeshFormat | None = Field(
-        description="Media type by file extension; null if the file is not served.",
-        examples=["stl"],
-    )
-    url: str | None = Field(
-        description="Path of the file; null if it is not served.",
-        examples=["/v1/robots/" + 64 * "0" + "/meshes/0"],
-    )
+    format: MeshFormat | None = Field(examples=["stl"])
+    """Media type by file extension; null if the file is not served."""
+    url: str | None = Field(examples=["/v1/robots/" + 64 * "0" + "/meshes/0"])
+    """Path of the file; null if it is not served."""
     problem: str | None = Field(description="Why it is not served; null if it is.", examples=[None])
 
 

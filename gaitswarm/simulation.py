@@ -171,22 +171,18 @@ class LogColumnView(View):
     """One recorded quantity."""
 
     unit: str = Field(description="Unit of the values.", examples=["rad"])
-    description: str = Field(
-        description="Meaning of the column.", examples=["angle of every joint"]
-    )
-    values: LogValues = Field(
-        description="One entry per row: a number, or nested lists where there are several joints,"
-        " legs or coordinates; null where undefined.",
-        examples=[[[0.0, 0.1], [0.01, 0.11]]],
-    )
+    description: str = Field(examples=["angle of every joint"])
+    """Meaning of the column."""
+    values: LogValues = Field(examples=[[[0.0, 0.1], [0.01, 0.11]]])
+    """One entry per row: a number, or nested lists where there are several joints, legs or
+    coordinates; null where undefined."""
 
 
 class WalkLogView(View):
     """Log of a simulation, column by column."""
 
-    rate: int = Field(
-        default=LOG_RATE, description="Rows per second of simulated time [Hz].", examples=[500]
-    )
+    rate: int = Field(default=LOG_RATE, examples=[500])
+    """Rows per second of simulated time [Hz]."""
     columns: dict[str, LogColumnView] = Field(
         description="Recorded quantities by name: " + ", ".join(QUANTITIES) + "."
     )
@@ -209,28 +205,22 @@ class WalkLogView(View):
 class PlannedGaitView(View):
     """Properties of a planned gait, without simulation."""
 
-    duty_factor: float = Field(
-        description="Support's share of the cycle, mean of all legs [1].", examples=[0.56]
-    )
+    duty_factor: float = Field(examples=[0.56])
+    """Support's share of the cycle, mean of all legs [1]."""
     fewest_feet: int = Field(description="That stand at any moment.", examples=[3])
-    margin: float | None = Field(
-        description="Least distance of the centre of mass from the edge of the support polygon [m],"
-        " negative outside; null while no foot stands.",
-        examples=[0.041],
-    )
+    margin: float | None = Field(examples=[0.041])
+    """Least distance of the centre of mass from the edge of the support polygon [m], negative
+    outside; null while no foot stands."""
     stable: bool = Field(description="Whether the gait is statically stable: margin above 0.")
 
 
 class SimulatedScenarioView(ScenarioResultView):
     """Result of the design in one scenario, with its log if requested."""
 
-    gait: PlannedGaitView | None = Field(
-        default=None, description="The planned gait: duty factor and static stability."
-    )
-    log: WalkLogView | None = Field(
-        default=None,
-        description="Log at 500 Hz; null unless requested, or if the robot never moved.",
-    )
+    gait: PlannedGaitView | None = None
+    """The planned gait: duty factor and static stability."""
+    log: WalkLogView | None = None
+    """Log at 500 Hz; null unless requested, or if the robot never moved."""
 
 
 class SimulationView(View):
@@ -241,20 +231,14 @@ class SimulationView(View):
     design: DesignValues
     preference: Preference = Field(description="By which utilities and fitness were computed.")
     precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
-    fitness: float | None = Field(
-        description="Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1];"
-        " null if any walk failed.",
-        examples=[20.87],
-    )
-    figure_of_merit: float | None = Field(
-        default=None,
-        description="To be maximized: F of eq. 3.1 [1], which is 1e5 / `fitness` under the"
-        " preference chapter-3; null under any other, and if any walk failed.",
-        examples=[6.9],
-    )
-    scenarios: dict[str, SimulatedScenarioView] = Field(
-        description="Result in each scenario, by the scenario's name."
-    )
+    fitness: float | None = Field(examples=[20.87])
+    """Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1]; null if any walk
+    failed."""
+    figure_of_merit: float | None = Field(default=None, examples=[6.9])
+    """To be maximized: F of eq. 3.1 [1], which is 1e5 / `fitness` under the preference chapter-3;
+    null under any other, and if any walk failed."""
+    scenarios: dict[str, SimulatedScenarioView]
+    """Result in each scenario, by the scenario's name."""
 
     @classmethod
     def from_result(cls, result: SimulationResult, gaits: Iterable[Stability]) -> SimulationView:

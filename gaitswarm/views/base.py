@@ -20,14 +20,10 @@ _LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
 class FieldErrorView(View):
     """What is wrong with one field of a request."""
 
-    field: str = Field(
-        description="Path of the field, parts joined by dots; empty for the request as a whole.",
-        examples=["variables.0.low"],
-    )
-    message: str = Field(
-        description="What is wrong with it and what it must be.",
-        examples=["must be a finite number"],
-    )
+    field: str = Field(examples=["variables.0.low"])
+    """Path of the field, parts joined by dots; empty for the request as a whole."""
+    message: str = Field(examples=["must be a finite number"])
+    """What is wrong with it and what it must be."""
 
     @classmethod
     def from_message(cls, field: str, message: str) -> FieldErrorView:
@@ -41,20 +37,15 @@ class FieldErrorView(View):
 class ProblemView(View):
     """A problem (RFC 9457, application/problem+json)."""
 
-    type: str = Field(
-        description="Kind of problem, the same for every occurrence of it.",
-        examples=["urn:gaitswarm:problem:invalid-request"],
-    )
+    type: str = Field(examples=["urn:gaitswarm:problem:invalid-request"])
+    """Kind of problem, the same for every occurrence of it."""
     title: str = Field(description="The kind in words.", examples=["Invalid request"])
     status: int = Field(description="HTTP status code.", examples=[422])
-    detail: str = Field(
-        description="What went wrong this time and what to do about it.",
-        examples=["iterations: must be at least 1"],
-    )
+    detail: str = Field(examples=["iterations: must be at least 1"])
+    """What went wrong this time and what to do about it."""
     instance: str = Field(description="Path of the request.", examples=["/v1/jobs"])
-    errors: list[FieldErrorView] = Field(
-        default=[], description="Every offending field; empty if no field is to blame."
-    )
+    errors: list[FieldErrorView] = Field(default=[])
+    """Every offending field; empty if no field is to blame."""
 
 
 def field_errors(errors: Iterable[Mapping[str, Any]], *, prefix: str = "") -> list[FieldErrorView]:

@@ -45,15 +45,12 @@ class RobotView(View):
     """A robot that ships with gaitswarm."""
 
     name: RobotName = Field(description="Name, as in job specs.", examples=["szabadka2"])
-    description: str = Field(
-        description="What it is, with its source.", examples=["Hexapod of 18 joints, 6.76 kg"]
-    )
-    parameters: list[Variable] = Field(
-        description="What an identification or calibration may fit of it, with bounds."
-    )
-    conventions: list[Variable] = Field(
-        description="Modelling choices that a calibration may vary as well."
-    )
+    description: str = Field(examples=["Hexapod of 18 joints, 6.76 kg"])
+    """What it is, with its source."""
+    parameters: list[Variable]
+    """What an identification or calibration may fit of it, with bounds."""
+    conventions: list[Variable]
+    """Modelling choices that a calibration may vary as well."""
 
 
 class ScenarioView(Scenario):
@@ -83,16 +80,13 @@ class ControllerView(View):
 
     name: CatalogueName
     description: Description
-    variables: list[Variable] = Field(
-        description="Design variables; a job searches all that it does not hold fixed."
-    )
-    conventions: list[Variable] = Field(
-        description="What the thesis leaves open; a design that does not set one has its default,"
-        " and a job may search it or hold it fixed."
-    )
-    gait_variables: list[Variable] = Field(
-        description="Gait parameters that a design may set as well, in place of the scenario's."
-    )
+    variables: list[Variable]
+    """Design variables; a job searches all that it does not hold fixed."""
+    conventions: list[Variable]
+    """What the thesis leaves open; a design that does not set one has its default, and a job may
+    search it or hold it fixed."""
+    gait_variables: list[Variable]
+    """Gait parameters that a design may set as well, in place of the scenario's."""
     published: dict[str, dict[str, float | str]] = Field(
         description="Designs from the literature, by preference or study: {name: value}.",
         examples=[{"A": {"I": 0.171, "FI1R": 5837.0}}],
@@ -104,21 +98,17 @@ class CaseView(View):
 
     name: CatalogueName
     description: Description
-    needs: str | None = Field(
-        description="Command that installs what is missing for it here; null if nothing is.",
-        examples=["pip install scikit-learn"],
-    )
-    settings_schema: dict[str, Any] = Field(
-        description="JSON schema of its settings, with defaults, bounds and descriptions."
-    )
+    needs: str | None = Field(examples=["pip install scikit-learn"])
+    """Command that installs what is missing for it here; null if nothing is."""
+    settings_schema: dict[str, Any]
+    """JSON schema of its settings, with defaults, bounds and descriptions."""
 
 
 class OptimizerView(CaseView):
     """A search method by its default settings, or a preset of one."""
 
-    name: OptimizerName = Field(
-        description="Name, as in job specs.", examples=["pso-falling-inertia"]
-    )
+    name: OptimizerName = Field(examples=["pso-falling-inertia"])
+    """Name, as in job specs."""
     settings: OptimizerSettings = Field(description="What the name stands for.")
 
 
@@ -127,13 +117,11 @@ class PluginView(View):
 
     kind: Kind = Field(description="What it brings.", examples=["case"])
     name: str = Field(description="Name, as in job specs.", examples=["mujoco-walk"])
-    distribution: str = Field(
-        description="Distribution that declares it.", examples=["gaitswarm-mujoco-case"]
-    )
+    distribution: str = Field(examples=["gaitswarm-mujoco-case"])
+    """Distribution that declares it."""
     version: str = Field(description="Version of the distribution.", examples=["0.1.0"])
-    state: Literal["ok", "refused"] = Field(
-        description="Whether jobs can name it.", examples=["ok"]
-    )
+    state: Literal["ok", "refused"] = Field(examples=["ok"])
+    """Whether jobs can name it."""
     reason: str | None = Field(description="Why they cannot; null if they can.", examples=[None])
 
 

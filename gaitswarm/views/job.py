@@ -39,22 +39,18 @@ class SearchView(View):
     """Fitness in single precision of a design that is judged in double."""
 
     precision: Precision = Field(description="Of the search.", examples=["single"])
-    fitness: float = Field(
-        description="Of the design in that precision; units as of `fitness`.", examples=[20.8712]
-    )
-    difference: float = Field(
-        description="By how much that is more than in double precision, relative [1].",
-        examples=[0.00006],
-    )
+    fitness: float = Field(examples=[20.8712])
+    """Of the design in that precision; units as of `fitness`."""
+    difference: float = Field(examples=[0.00006])
+    """By how much that is more than in double precision, relative [1]."""
 
 
 class BestView(EvaluationView):
     """The best design that a job has found so far, always judged in double precision."""
 
     fitness: float = Field(description="As of any evaluation; never null.", examples=[20.87])
-    search: SearchView | None = Field(
-        default=None, description="Fitness that a search in single precision was given."
-    )
+    search: SearchView | None = None
+    """Fitness that a search in single precision was given."""
 
     @classmethod
     def from_evaluation(cls, evaluation: Evaluation, spec: Spec) -> BestView:
@@ -86,18 +82,14 @@ class IterationView(View):
     mean: Finite = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
     median: Finite = Field(description="Median of them [1].", examples=[23.9])
     worst: Finite = Field(description="Greatest of them [1].", examples=[41.7])
-    best_so_far: Finite = Field(
-        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
-    )
+    best_so_far: Finite = Field(examples=[20.9])
+    """Least fitness of this and all earlier iterations [1]."""
     failed: int = Field(description="Designs that failed in some scenario [1].", examples=[2])
-    infeasible: int = Field(
-        description="Designs that did not fail and violate a constraint [1].", examples=[0]
-    )
-    least_violation: Finite = Field(
-        description="Least violation of its designs, 0 for a feasible one [1]; null without"
-        " constraints, or if every design failed.",
-        examples=[None],
-    )
+    infeasible: int = Field(examples=[0])
+    """Designs that did not fail and violate a constraint [1]."""
+    least_violation: Finite = Field(examples=[None])
+    """Least violation of its designs, 0 for a feasible one [1]; null without constraints, or if
+    every design failed."""
     evaluate_seconds: float = Field(description="Time of its evaluation [s].", examples=[1.23])
     committed_at: datetime = Field(description="When it was committed, UTC.")
     digest: str | None = Field(
@@ -134,112 +126,68 @@ class JobSummaryView(View):
     id: JobName
     name: str = Field(description="Name, given with the spec or later.", examples=["chapter 4"])
     kind: JobKind | None = Field(description="What it tunes, fits or tests.", examples=["tuning"])
-    state: JobState = Field(
-        description="State; a pausing job finishes its iteration first.", examples=["running"]
-    )
+    state: JobState = Field(examples=["running"])
+    """State; a pausing job finishes its iteration first."""
     error: str | None = Field(description="Why it failed, or why its spec cannot be read.")
-    controller: str | None = Field(
-        description="Motor controller that it tunes; null for none.", examples=["fuzzy-pi"]
-    )
-    scenarios: list[str] = Field(
-        description="Scenarios of every design, or recordings or walks that it is fitted to.",
-        examples=[["normal-fast", "turn-right-fast"]],
-    )
-    precision: Precision | None = Field(
-        description="Precision of the search; the best is judged in double.", examples=["double"]
-    )
+    controller: str | None = Field(examples=["fuzzy-pi"])
+    """Motor controller that it tunes; null for none."""
+    scenarios: list[str] = Field(examples=[["normal-fast", "turn-right-fast"]])
+    """Scenarios of every design, or recordings or walks that it is fitted to."""
+    precision: Precision | None = Field(examples=["double"])
+    """Precision of the search; the best is judged in double."""
     optimizer: str | None = Field(description="Search method.", examples=["pso"])
     particles: int = Field(description="Most designs of one iteration [1].", examples=[25])
     iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
-    iterations_planned: int = Field(
-        description="Budget in iterations of `particles` designs each [1].", examples=[25]
-    )
+    iterations_planned: int = Field(examples=[25])
+    """Budget in iterations of `particles` designs each [1]."""
     evaluations: int = Field(description="Designs judged so far [1].", examples=[300])
-    evaluations_saved: int = Field(
-        description="Of these, designs whose results were already known [1].", examples=[25]
-    )
-    evaluations_planned: int = Field(
-        description="Designs that the whole budget will judge [1].", examples=[625]
-    )
-    best_fitness: Finite = Field(
-        description="Least fitness so far, in double precision [1]; null while every design has"
-        " failed or violates a constraint.",
-        examples=[21.3],
-    )
-    infeasible: int = Field(
-        default=0, description="Designs that did not fail and violate a constraint [1]."
-    )
-    least_violation: Finite = Field(
-        default=None,
-        description="Least violation of the constraints so far, 0 once a design is feasible [1];"
-        " null without constraints, or while every design has failed.",
-    )
-    reference: ReferenceView | None = Field(
-        default=None,
-        description="Published design of its controller and preference in the same walks; null"
-        " without one, and until the job has ended or `/v1/jobs/{job_id}/verdict` was requested.",
-    )
-    gain: Finite = Field(
-        default=None,
-        description="Share by which `best_fitness` is less than that of `reference` [1].",
-        examples=[0.39],
-    )
-    best_iteration: int | None = Field(
-        description="Iteration that found it, from 0.", examples=[11]
-    )
-    compute_seconds: float = Field(
-        description="Time spent in evaluating committed iterations [s].", examples=[14.8]
-    )
-    evaluations_per_second: float | None = Field(
-        description="Designs judged per second of that time [1/s].", examples=[20.3]
-    )
-    simulations_per_second: float | None = Field(
-        description="Simulations that were not saved, per second of that time [1/s].",
-        examples=[121.6],
-    )
-    evaluated_on: str | None = Field(
-        default=None,
-        description="Where its last iteration was simulated: threads, or workers of Ray.",
-        examples=["ray: 4 workers on 2 nodes"],
-    )
-    waiting: str | None = Field(
-        default=None, description="What a running job waits for, such as unreachable workers."
-    )
-    eta_seconds: float | None = Field(
-        description="Estimated time to the end of the budget [s]; null if unknown.",
-        examples=[16.1],
-    )
-    eta_basis: str = Field(
-        default="",
-        description="Basis of `eta_seconds`, or why it is unknown.",
-        examples=["at the pace of the last iterations, 1.23 s each"],
-    )
-    lineage: Lineage | None = Field(
-        default=None, description="Parent of a fork, and what it took over."
-    )
-    robot: str | None = Field(
-        default=None,
-        description="Name of its robot; of a custom one that in robot.toml, or `own`.",
-        examples=["szabadka2-reconstructed"],
-    )
-    preference: str | None = Field(
-        default=None,
-        description="Name of the preference that it tunes by, `own` for a custom one.",
-        examples=["A"],
-    )
+    evaluations_saved: int = Field(examples=[25])
+    """Of these, designs whose results were already known [1]."""
+    evaluations_planned: int = Field(examples=[625])
+    """Designs that the whole budget will judge [1]."""
+    best_fitness: Finite = Field(examples=[21.3])
+    """Least fitness so far, in double precision [1]; null while every design has failed or violates
+    a constraint."""
+    infeasible: int = 0
+    """Designs that did not fail and violate a constraint [1]."""
+    least_violation: Finite = None
+    """Least violation of the constraints so far, 0 once a design is feasible [1]; null without
+    constraints, or while every design has failed."""
+    reference: ReferenceView | None = None
+    """Published design of its controller and preference in the same walks; null without one, and
+    until the job has ended or `/v1/jobs/{job_id}/verdict` was requested."""
+    gain: Finite = Field(default=None, examples=[0.39])
+    """Share by which `best_fitness` is less than that of `reference` [1]."""
+    best_iteration: int | None = Field(examples=[11])
+    """Iteration that found it, from 0."""
+    compute_seconds: float = Field(examples=[14.8])
+    """Time spent in evaluating committed iterations [s]."""
+    evaluations_per_second: float | None = Field(examples=[20.3])
+    """Designs judged per second of that time [1/s]."""
+    simulations_per_second: float | None = Field(examples=[121.6])
+    """Simulations that were not saved, per second of that time [1/s]."""
+    evaluated_on: str | None = Field(default=None, examples=["ray: 4 workers on 2 nodes"])
+    """Where its last iteration was simulated: threads, or workers of Ray."""
+    waiting: str | None = None
+    """What a running job waits for, such as unreachable workers."""
+    eta_seconds: float | None = Field(examples=[16.1])
+    """Estimated time to the end of the budget [s]; null if unknown."""
+    eta_basis: str = Field(default="", examples=["at the pace of the last iterations, 1.23 s each"])
+    """Basis of `eta_seconds`, or why it is unknown."""
+    lineage: Lineage | None = None
+    """Parent of a fork, and what it took over."""
+    robot: str | None = Field(default=None, examples=["szabadka2-reconstructed"])
+    """Name of its robot; of a custom one that in robot.toml, or `own`."""
+    preference: str | None = Field(default=None, examples=["A"])
+    """Name of the preference that it tunes by, `own` for a custom one."""
     note: str = Field(default="", description="Note, free text.")
     tags: list[str] = Field(default_factory=list, description="Tags.", examples=[["thesis"]])
     archived: bool = Field(default=False, description="Whether lists leave it out.")
-    owner: str | None = Field(
-        default=None, description="Name of the token that submitted it.", examples=["ci"]
-    )
+    owner: str | None = Field(default=None, examples=["ci"])
+    """Name of the token that submitted it."""
     kept: bool = Field(default=False, description="Whether it is protected from deletion.")
-    priority: int = Field(
-        default=0,
-        description="Priority: the highest one runs first; each step doubles the share of workers"
-        " [1].",
-        examples=[0],
-    )
+    priority: int = Field(default=0, examples=[0])
+    """Priority: the highest one runs first; each step doubles the share of workers [1]."""
     created_at: datetime = Field(description="When it was submitted, UTC.")
     updated_at: datetime = Field(
         description="When its state, progress or waiting last changed, UTC."
@@ -275,28 +223,22 @@ class JobView(JobSummaryView):
 
     model_config = ConfigDict(serialize_by_alias=True)
 
-    best: BestView | None = Field(
-        description="Best design so far, judged in double precision; null while none walks in"
-        " every scenario and keeps the constraints."
-    )
-    closest: ClosestView | None = Field(
-        default=None,
-        description="Design of least violation; null without constraints, and once a design is"
-        " feasible.",
-    )
+    best: BestView | None
+    """Best design so far, judged in double precision; null while none walks in every scenario and
+    keeps the constraints."""
+    closest: ClosestView | None = None
+    """Design of least violation; null without constraints, and once a design is feasible."""
     objectives: list[ObjectiveView] = Field(description="What its designs minimize.")
-    measurements: list[ObjectiveView] = Field(
-        default_factory=list, description="Further columns of its results."
-    )
+    measurements: list[ObjectiveView] = Field(default_factory=list)
+    """Further columns of its results."""
     stored_spec: AnySpec | None = Field(
         alias="spec",
         description="Spec, with scenarios, preference and variables as they were on submission;"
         " null if this version cannot read it.",
     )
-    provenance: list[ProvenanceRecord] = Field(
-        description="What its numbers depend on besides the spec; one entry since submission, and"
-        " one for every change that was accepted."
-    )
+    provenance: list[ProvenanceRecord]
+    """What its numbers depend on besides the spec; one entry since submission, and one for every
+    change that was accepted."""
     head: str | None = Field(
         default=None,
         description="Digest of the last committed iteration, chained to all before it and"
@@ -346,9 +288,8 @@ class StateView(View):
     error: str | None = Field(description="Why it failed; null if it did not.")
     iterations: int = Field(description="Iterations committed so far [1].", examples=[25])
     evaluations: int = Field(description="Designs judged in them [1].", examples=[625])
-    waiting: str | None = Field(
-        default=None, description="What a running job waits for, such as unreachable workers."
-    )
+    waiting: str | None = None
+    """What a running job waits for, such as unreachable workers."""
 
     @classmethod
     def from_job(cls, job: Job) -> StateView:

@@ -61,28 +61,21 @@ class ActivityView(View):
 class NotificationView(View):
     """A notification of a job's end."""
 
-    id: str = Field(
-        description="The same at every attempt; the header `webhook-id`.",
-        examples=["msg_6a09e667f3bcc908b2fb1366"],
-    )
-    host: str = Field(
-        description="Host of the receiver; paths may be secrets.", examples=["ci.example"]
-    )
-    event: str = Field(
-        description="`job.succeeded`, `job.failed` or `job.cancelled`.", examples=["job.succeeded"]
-    )
-    state: Literal["waiting", "delivered", "given up"] = Field(
-        description="Delivery state; failed deliveries are retried for some hours."
-    )
+    id: str = Field(examples=["msg_6a09e667f3bcc908b2fb1366"])
+    """The same at every attempt; the header `webhook-id`."""
+    host: str = Field(examples=["ci.example"])
+    """Host of the receiver; paths may be secrets."""
+    event: str = Field(examples=["job.succeeded"])
+    """`job.succeeded`, `job.failed` or `job.cancelled`."""
+    state: Literal["waiting", "delivered", "given up"]
+    """Delivery state; failed deliveries are retried for some hours."""
     attempts: int = Field(description="How often it was sent [1].", examples=[1])
     created_at: datetime = Field(description="When the job ended, UTC.")
-    next_attempt_at: datetime | None = Field(
-        description="Next attempt, UTC; null once it was delivered or given up."
-    )
+    next_attempt_at: datetime | None
+    """Next attempt, UTC; null once it was delivered or given up."""
     delivered_at: datetime | None = Field(description="When it was delivered, UTC.")
-    error: str | None = Field(
-        description="Why the last attempt failed.", examples=["the receiver answered 500"]
-    )
+    error: str | None = Field(examples=["the receiver answered 500"])
+    """Why the last attempt failed."""
 
     @classmethod
     def from_notification(cls, notification: Notification) -> NotificationView:

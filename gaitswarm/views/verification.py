@@ -20,16 +20,12 @@ Certificate = Annotated[
 class CheckView(View):
     """Result of one check."""
 
-    name: str = Field(
-        description="archive, hashes, contents, robot, fitness, best, designs, search, chain,"
-        " replay, head, certificates; of a certificate also summary, design.",
-        examples=["fitness"],
-    )
+    name: str = Field(examples=["fitness"])
+    """archive, hashes, contents, robot, fitness, best, designs, search, chain, replay, head,
+    certificates; of a certificate also summary, design."""
     passed: bool | None = Field(description="Whether it passed; null if it does not apply.")
-    detail: str = Field(
-        description="What was compared, or what differs.",
-        examples=["625 of 625 follow from the raw objectives, to the bit"],
-    )
+    detail: str = Field(examples=["625 of 625 follow from the raw objectives, to the bit"])
+    """What was compared, or what differs."""
     certificate: Certificate = None
 
 
@@ -50,16 +46,13 @@ class ReplayedView(View):
 
     verified: bool = Field(description="Whether no check failed.", examples=[True])
     checks: list[CheckView] = Field(description="In their order; a damaged file ends them early.")
-    provenance: list[str] = Field(
-        description="Changes of provenance on this machine, if any. Not a failure by itself: the"
-        " replay shows whether it matters.",
-        examples=[["other simulation code"]],
-    )
+    provenance: list[str] = Field(examples=[["other simulation code"]])
+    """Changes of provenance on this machine, if any. Not a failure by itself: the replay shows
+    whether it matters."""
     replayed: int = Field(description="Evaluations that were repeated.", examples=[21])
     seed: int = Field(description="Seed of the draw.", examples=[7])
-    differences: list[DifferenceView] = Field(
-        description="Numbers with other bits, the first hundred."
-    )
+    differences: list[DifferenceView]
+    """Numbers with other bits, the first hundred."""
 
 
 class HistoryVerificationView(ReplayedView):
@@ -77,9 +70,7 @@ class HistoryVerificationView(ReplayedView):
 class VerificationView(ReplayedView):
     """Results of checking evidence or a stored history."""
 
-    unproved: list[str] = Field(
-        default=["id", "state", "times"],
-        description="What the file says of the job without proof.",
-    )
+    unproved: list[str] = Field(default=["id", "state", "times"])
+    """What the file says of the job without proof."""
     sha256: str = Field(description="Of the file.", examples=["9f86d081884c7d65..."])
     job: str | None = Field(description="Identifier of the job; null if it cannot be read.")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import types
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from gaitswarm.services.optimizer.views import field_docstrings
 from gaitswarm.settings import Settings, variable_of
 from scripts.manual.tables import code, head, kind_of, row
 
@@ -34,25 +32,12 @@ def models(model: type[BaseModel]) -> Iterator[str]:
 def settings() -> Iterator[str]:
     """Every setting by the variable that it is read from: lines of Markdown."""
     yield from head("variable", "type", "default", "meaning")
-    meanings = _attribute_docstrings(Settings)
+    meanings = field_docstrings(Settings.__module__)[Settings.__name__]
     for name, schema in Settings.model_json_schema()["properties"].items():
         variable = code(variable_of(name))
         # Where a setting may be null, that is the variable that is not set.
         kind = kind_of(schema).removesuffix(" or null")
         yield row([variable, kind, _variable(schema.get("default")), meanings[name]])
-
-
-def _attribute_docstrings(model: type[BaseModel]) -> dict[str, str]:
-    """Docstrings below the fields of a model, each in one line."""
-    (definition,) = ast.parse(inspect.getsource(model)).body
-    statements = definition.body if isinstance(definition, ast.ClassDef) else []
-    return {
-        field.target.id: " ".join(text.value.value.split())
-        for field, text in pairwise(statements)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
-        if isinstance(text.value.value, str)
-    }
 
 
 def _variable(default: object) -> str:

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.optimizer.views import StatusName
+from gaitswarm.services.optimizer.views import StatusName, View
 from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, RESULTS, Status
@@ -37,6 +37,30 @@ def test_objectives_and_statuses_are_the_simulators(job: Job) -> None:
     measured = JobView.from_job_and_best(job, None).measurements
     assert [(o.name, o.unit) for o in measured] == [(m.name, m.unit) for m in MEASUREMENTS]
     assert get_args(StatusName) == tuple(status.label for status in Status)
+
+
+class Leg(View):
+    """A leg."""
+
+    mass: float
+    """Of its three links,
+    in kilograms."""
+
+
+class Foreleg(Leg):
+    """A foreleg."""
+
+    reach: float = 0.5
+    """How far it gets [m]."""
+
+
+def test_docstrings_below_fields_are_their_descriptions_in_schemas() -> None:
+    fields = Foreleg.model_json_schema()["properties"]
+    assert fields["mass"]["description"] == "Of its three links, in kilograms."
+    assert (fields["reach"]["description"], fields["reach"]["default"]) == (
+        "How far it gets [m].",
+        0.5,
+    )
 
 
 def test_numbers_that_are_not_finite_are_null(job: Job) -> None:

@@ -340,6 +340,12 @@ class GivenDesign:
             return self.spec.robot
         return chosen_robot(option)
 
+    def scenarios(self, option: str | None, robot: str | None) -> Sequence[Any]:
+        """Return the unchecked scenarios of the option, else the job's, else all of the robot."""
+        if option is None and self.spec is not None:
+            return self.spec.resolved_scenarios()
+        return scenario_data(option or "all", robot)
+
 
 def given_design(
     given: str,

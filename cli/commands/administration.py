@@ -19,7 +19,7 @@ from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.store.tokens import Tokens
+    from gaitswarm.services.optimizer.store import Store
     from gaitswarm.views.catalogue import CaseView, OptimizerView
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing data.")]
@@ -52,12 +52,11 @@ def check(
     The history of every job is compared with its digests. The exit code is 1 if there are findings.
     """
     from gaitswarm.services.optimizer.analysis.verification import check_histories
-    from gaitswarm.services.optimizer.store import maintenance, open_store
+    from gaitswarm.services.optimizer.store import maintenance
 
-    database = _database(db)
-    findings = maintenance.check(database)
+    findings = maintenance.check(_database(db))
     if not skip_histories:
-        with closing(open_store(database)) as store:
+        with _store(db) as store:
             findings += check_histories(store)
     show(findings, findings, as_json=as_json)
     if findings:
@@ -86,11 +85,9 @@ def restore(
 
     Backups of older versions are upgraded, and can be restored to PostgreSQL.
     """
-    from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.optimizer.store import maintenance
-    from gaitswarm.settings import read_settings
 
-    maintenance.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
+    maintenance.restore(_database(db, create=True), file, overwrite=force)
     note(f"database restored from {file}")
 
 
@@ -135,12 +132,20 @@ def prune(
     )
 
 
-def _database(db: str | None) -> str:
-    """Return the URL of the option or environment; raise NotFound for a missing SQLite file."""
-    from gaitswarm.jobs.open import database_to_read
+def _database(db: str | None, *, create: bool = False) -> str:
+    """Return the URL of the option or environment; a missing SQLite file may be an error."""
+    from gaitswarm.jobs.open import database_to_read, database_to_write
     from gaitswarm.settings import read_settings
 
-    return database_to_read(read_settings(db=db or None))
+    return (database_to_write if create else database_to_read)(read_settings(db=db or None))
+
+
+@contextmanager
+def _store(db: str | None, *, create: bool = False) -> Iterator[Store]:
+    from gaitswarm.services.optimizer.store import open_store
+
+    with closing(open_store(_database(db, create=create))) as store:
+        yield store
 
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the token, owner of its jobs.")]
@@ -160,8 +165,8 @@ def create(
     """Create a token; its secret is printed once and never stored."""
     from gaitswarm.services.optimizer.access import Scope
 
-    with _tokens(db) as tokens:
-        token, secret = tokens.create(name, Scope(scope))
+    with _store(db, create=True) as store:
+        token, secret = store.tokens.create(name, Scope(scope))
 
     def parts() -> Parts:
         note(f"token {name!r} of scope {scope}; the secret is shown only once:")
@@ -172,8 +177,8 @@ def create(
 
 def list_tokens(db: Db = None) -> Printed:
     """List tokens, oldest first."""
-    with _tokens(db, create=False) as tokens:
-        listed = tokens.all()
+    with _store(db) as store:
+        listed = store.tokens.all()
 
     def parts() -> Parts:
         if not listed:
@@ -188,26 +193,14 @@ def list_tokens(db: Db = None) -> Printed:
 
 def revoke(name: Name, db: Db = None) -> Printed:
     """Revoke a token; servers refuse it within five seconds."""
-    with _tokens(db, create=False) as tokens:
-        token = tokens.revoke(name)
+    with _store(db) as store:
+        token = store.tokens.revoke(name)
 
     def parts() -> Parts:
         note(f"token {name!r} is revoked")
         yield from ()
 
     return token, parts()
-
-
-@contextmanager
-def _tokens(db: str | None, *, create: bool = True) -> Iterator[Tokens]:
-    """Open the tokens of the database; a missing one is created, or an error."""
-    from gaitswarm.jobs.open import database_to_read, database_to_write
-    from gaitswarm.services.optimizer.store import open_store
-    from gaitswarm.settings import read_settings
-
-    url = (database_to_write if create else database_to_read)(read_settings(db=db or None))
-    with closing(open_store(url)) as store:
-        yield store.tokens
 
 
 def audit(
@@ -226,12 +219,7 @@ def audit(
 
     Reads the database; administrators of a server can also read /v1/audit.
     """
-    from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.services.optimizer.store import open_store
-    from gaitswarm.settings import read_settings
-
-    settings = read_settings(db=db or None)
-    with closing(open_store(database_to_write(settings))) as store:
+    with _store(db, create=True) as store:
         entries = store.audit(job_id=job, limit=limit).items
 
     def parts() -> Parts:

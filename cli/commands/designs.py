@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,11 +32,9 @@ from gaitswarm.cli.tables import (
 )
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.inputs import GivenDesign
     from gaitswarm.firmware import FirmwareView, TrajectoriesView
-    from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, RobustnessView
-    from gaitswarm.sim.scenario import Scenario
-    from gaitswarm.simulation import Progress, SimulationView
+    from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
+    from gaitswarm.simulation import SimulationView
 
 
 def simulate(
@@ -81,13 +77,7 @@ def simulate(
     place: Place,
 ) -> Printed:
     """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
-    from gaitswarm.cli.inputs import (
-        given_design,
-        json_object,
-        on_terrain,
-        robot_defaults,
-        scenario_data,
-    )
+    from gaitswarm.cli.inputs import given_design, json_object, on_terrain, robot_defaults
     from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
     from gaitswarm.specs import checked
@@ -97,13 +87,11 @@ def simulate(
         "robot": given.robot(robot),
         "controller": given.controller,
         "design": given.values,
-        "scenarios": scenario_data(scenario or "all", robot),
+        "scenarios": given.scenarios(scenario, robot),
         "preference": preference or robot_defaults(robot).preference,
         "precision": precision or "double",
         "log": log is not None,
     }
-    if given.spec is not None and scenario is None:
-        data["scenarios"] = given.spec.resolved_scenarios()
     if terrain is not None:
         data["scenarios"] = on_terrain(data["scenarios"], terrain)
     if given.spec is not None and preference is None:
@@ -153,59 +141,6 @@ def _simulated(view: SimulationView) -> Parts:
             yield f"{name}: {result.explanation}"
 
 
-Samples = Annotated[int, typer.Option(help="Designs to sample around each given one.")]
-Radius = Annotated[
-    float, typer.Option(help="Radius of the sample, as a share of each variable's bounds.")
-]
-Seed = Annotated[int, typer.Option(help="Seed of the sample.")]
-
-
-@dataclass(frozen=True, slots=True)
-class SampleOptions:
-    """Options of a sample around designs."""
-
-    samples: Samples = 256
-    radius: Radius = 0.02
-    seed: Seed = 1
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas, or all.",
-            show_default="those of the job, else all of the robot",
-        ),
-    ] = None
-    controller: ControllerOption = None
-    robot: RobotOption = None
-    precision: Precision = None
-
-    def request(self, given: GivenDesign) -> RobustnessRequest:
-        """Return the request for a design; a job's best uses the job's scenarios and robot."""
-        from gaitswarm.cli.inputs import robot_defaults, scenario_data
-        from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest
-        from gaitswarm.specs import checked
-
-        scenarios: Any = scenario_data(self.scenarios or "all", self.robot)
-        if given.spec is None:
-            controlled = robot_defaults(self.robot).of_controller(given.controller)
-            variables = controlled.get("variables")
-        else:
-            variables = given.spec.design_space().variables
-            if self.scenarios is None:
-                scenarios = given.spec.resolved_scenarios()
-        data = {
-            "controller": given.controller,
-            "design": given.values,
-            "samples": self.samples,
-            "radius": self.radius,
-            "seed": self.seed,
-            "precision": self.precision or "double",
-            "scenarios": scenarios,
-            "robot": given.robot(self.robot),
-            "variables": variables,
-        }
-        return checked(RobustnessRequest, data)
-
-
 def robustness(
     design: Annotated[
         str,
@@ -215,7 +150,21 @@ def robustness(
             " best.",
         ),
     ],
-    options: SampleOptions,
+    samples: Annotated[int, typer.Option(help="Designs to sample around each given one.")] = 256,
+    radius: Annotated[
+        float, typer.Option(help="Radius of the sample, as a share of each variable's bounds.")
+    ] = 0.02,
+    seed: Annotated[int, typer.Option(help="Seed of the sample.")] = 1,
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all.",
+            show_default="those of the job, else all of the robot",
+        ),
+    ] = None,
+    controller: ControllerOption = None,
+    robot: RobotOption = None,
+    precision: Precision = None,
     *,
     place: Place,
 ) -> Printed:
@@ -224,10 +173,36 @@ def robustness(
     It is the norm of the Jacobian of the objectives' logarithms with respect to the variables as
     shares of their bounds, from a regression over designs sampled around the given one.
     """
-    from gaitswarm.cli.inputs import given_design
+    from gaitswarm.cli.inputs import given_design, robot_defaults
+    from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest
+    from gaitswarm.simulation import run_robustness
+    from gaitswarm.specs import checked
 
-    given = given_design(design, options.controller, robot=options.robot, place=place)
-    view = estimate(options.request(given))
+    given = given_design(design, controller, robot=robot, place=place)
+    if given.spec is None:
+        variables = robot_defaults(robot).of_controller(given.controller).get("variables")
+    else:
+        variables = given.spec.design_space().variables
+    data = {
+        "controller": given.controller,
+        "design": given.values,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+        "precision": precision or "double",
+        "scenarios": given.scenarios(scenarios, robot),
+        "robot": given.robot(robot),
+        "variables": variables,
+    }
+    last = time.monotonic()
+
+    def progress(done: int, planned: int) -> None:
+        nonlocal last
+        if done < planned and time.monotonic() - last >= 2.0:
+            last = time.monotonic()
+            note(f"{done} of {planned} simulations")
+
+    view = run_robustness(checked(RobustnessRequest, data), progress=progress)
     return view, _robustness(view)
 
 
@@ -261,51 +236,48 @@ def _robustness(view: RobustnessView) -> Parts:
         yield f"fixed: {', '.join(view.held)}"
 
 
-def estimate(request: RobustnessRequest) -> RobustnessView:
-    """Estimate the index, with progress on stderr."""
-    from gaitswarm.simulation import run_robustness
+@dataclass(frozen=True, slots=True)
+class FolderOptions:
+    """A design, and the folder to which it is written."""
 
-    with shown_progress() as progress:
-        return run_robustness(request, progress=progress)
+    design: Annotated[
+        str,
+        typer.Argument(
+            metavar="DESIGN|ID",
+            help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
+        ),
+    ]
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="New folder.")]
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
+            " else all]."
+        ),
+    ] = None
+    controller: ControllerOption = None
+    robot: RobotOption = None
 
+    def read(self, place: Place) -> tuple[str, dict[str, Any]]:
+        """Return the design's label, and arguments of the function that writes the folder."""
+        from gaitswarm.cli.inputs import chosen_scenarios, given_design
 
-@contextmanager
-def shown_progress() -> Iterator[Progress]:
-    """Print progress to stderr every two seconds."""
-    last = time.monotonic()
-
-    def progress(done: int, planned: int) -> None:
-        nonlocal last
-        if done < planned and time.monotonic() - last >= 2.0:
-            last = time.monotonic()
-            note(f"{done} of {planned} simulations")
-
-    yield progress
-
-
-_Design = Annotated[
-    str,
-    typer.Argument(
-        metavar="DESIGN|ID",
-        help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
-    ),
-]
-_NewFolder = Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="New folder.")]
-_Scenarios = Annotated[
-    str | None,
-    typer.Option(
-        help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
-        " else all]."
-    ),
-]
+        given = given_design(self.design, self.controller, robot=self.robot, place=place)
+        if given.spec is None or self.scenarios is not None:
+            scenarios = chosen_scenarios(self.scenarios or "all", self.robot)
+        else:
+            scenarios = given.spec.resolved_scenarios()
+        return given.label, {
+            "design": given.values,
+            "output": self.output,
+            "scenarios": scenarios,
+            "controller": given.controller,
+            "robot": given.robot(self.robot),
+        }
 
 
 def firmware(
-    design: _Design,
-    output: _NewFolder,
-    scenarios: _Scenarios = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
+    options: FolderOptions,
     table_bits: Annotated[
         str | None,
         typer.Option(
@@ -317,28 +289,12 @@ def firmware(
     place: Place,
 ) -> Printed:
     """Write a design as C for the robot's microcontrollers, with a test against simulations."""
-    from gaitswarm.cli.inputs import given_design
     from gaitswarm.firmware import write_firmware
 
-    given = given_design(design, controller, robot=robot, place=place)
-    view = write_firmware(
-        given.values,
-        output,
-        scenarios=_walks(given, scenarios, robot),
-        controller=given.controller,
-        robot=given.robot(robot),
-        label=given.label,
-        table_bits=None if table_bits is None else _bits(table_bits),
-    )
+    label, arguments = options.read(place)
+    bits = None if table_bits is None else _bits(table_bits)
+    view = write_firmware(**arguments, label=label, table_bits=bits)
     return view, _firmware(view)
-
-
-def _walks(given: GivenDesign, scenarios: str | None, robot: str | None) -> tuple[Scenario, ...]:
-    from gaitswarm.cli.inputs import chosen_scenarios
-
-    if given.spec is None or scenarios is not None:
-        return chosen_scenarios(scenarios or "all", robot)
-    return given.spec.resolved_scenarios()
 
 
 def _bits(text: str) -> tuple[int, int]:
@@ -377,11 +333,7 @@ def _firmware(view: FirmwareView) -> Parts:
 
 
 def trajectories(
-    design: _Design,
-    output: _NewFolder,
-    scenarios: _Scenarios = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
+    options: FolderOptions,
     rate: Annotated[
         float,
         typer.Option(help="Rows a second, changed so that a cycle has a whole number of them."),
@@ -393,19 +345,10 @@ def trajectories(
     place: Place,
 ) -> Printed:
     """Write a design's joint angles for position-controlled servos, as CSV and for ROS 2."""
-    from gaitswarm.cli.inputs import given_design
     from gaitswarm.firmware import write_trajectories
 
-    given = given_design(design, controller, robot=robot, place=place)
-    view = write_trajectories(
-        given.values,
-        output,
-        scenarios=_walks(given, scenarios, robot),
-        controller=given.controller,
-        robot=given.robot(robot),
-        rate=rate,
-        held=held,
-    )
+    _, arguments = options.read(place)
+    view = write_trajectories(**arguments, rate=rate, held=held)
     return view, _trajectories(view)
 
 

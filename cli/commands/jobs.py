@@ -32,6 +32,18 @@ from gaitswarm.cli.options import (
     one_of,
 )
 from gaitswarm.cli.output import Parts, Printed, note, print_table, print_text, write_json_items
+from gaitswarm.cli.tables import (
+    MISSING,
+    best_parts,
+    job_parts,
+    jobs_table,
+    lineage_line,
+    number,
+    place,
+    table,
+    verdict_lines,
+    worth,
+)
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
@@ -140,8 +152,6 @@ def list_jobs(
         )
 
     def parts() -> Parts:
-        from gaitswarm.cli.tables import jobs_table
-
         rows = list(matches(limit + 1))
         if rows:
             yield jobs_table(rows[:limit])
@@ -155,8 +165,6 @@ def list_jobs(
 
 def status(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Show a job's state, progress and best design, and the reason if it failed."""
-    from gaitswarm.cli.tables import job_parts
-
     job = jobs.job(job_id)
     return job, job_parts(job)
 
@@ -214,8 +222,6 @@ def history(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
 
     With --json, also every design: values, fitness, statuses and raw objectives.
     """
-    from gaitswarm.cli.tables import number, table
-
     with place.open() as jobs:
         job = jobs.job(job_id)
         if as_json:
@@ -254,8 +260,6 @@ def best(job_id: JobId, *, jobs: Jobs) -> Printed:
     view = jobs.best(job_id)
 
     def parts() -> Parts:
-        from gaitswarm.cli.tables import best_parts, place, verdict_lines, worth
-
         job = jobs.job(job_id)
         yield f"job {job_id}: fitness {worth(view, digits=6)}, design {place(view)}"
         yield from best_parts(view, job)
@@ -275,8 +279,6 @@ def diff(job_ids: JobIds, *, jobs: Jobs) -> Printed:
 
 
 def _comparison(view: JobComparisonView) -> Parts:
-    from gaitswarm.cli.tables import MISSING, number, table
-
     rows = [
         ("name", *(job.name or MISSING for job in view.jobs)),
         ("state", *(job.state for job in view.jobs)),
@@ -359,7 +361,6 @@ def fork(
         scenario_data,
         weights_choice,
     )
-    from gaitswarm.cli.tables import lineage_line
 
     values = {
         "preference": None if preference is None else preference_choice(preference),

@@ -41,14 +41,19 @@ def json_object(text: str, option: str) -> dict[str, Any]:
 
 def read_json_object(path: Path, option: str) -> dict[str, Any]:
     """Read a JSON object from a file, or from standard input for `-`."""
+    return _parsed(read_file(path, option), f"{path} ", option)
+
+
+def read_file(path: Path, option: str, most: int = LARGEST_FILE) -> bytes:
+    """Read a file of at most so many bytes, or standard input for `-`."""
     try:
         with sys.stdin.buffer if str(path) == "-" else path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
+            content = file.read(most + 1)
     except OSError as error:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field=option) from error
-    if len(content) > LARGEST_FILE:
-        raise InvalidRequest(f"{path} is larger than {LARGEST_FILE >> 20} MiB", field=option)
-    return _parsed(content, f"{path} ", option)
+    if len(content) > most:
+        raise InvalidRequest(f"{path} is larger than {most >> 20} MiB", field=option)
+    return content
 
 
 def _parsed(content: str | bytes, where: str, option: str) -> dict[str, Any]:

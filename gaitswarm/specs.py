@@ -54,7 +54,20 @@ SpecInput: TypeAlias = Spec | Document
 """A job of any kind, as object or as document."""
 
 
-class SpecOptions(TypedDict, total=False):
+class _SharedOptions(TypedDict, total=False):
+    name: str
+    robot: RobotInput
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    preference: PreferenceInput
+    constraints: Sequence[ConstraintInput]
+    optimizer: OptimizerName | OptimizerSettings | Document
+    particles: int
+    iterations: int
+    scenario_weights: Mapping[str, float]
+    scenario_aggregate: Literal["mean", "worst"]
+
+
+class SpecOptions(_SharedOptions, total=False):
     """Fields of a `JobSpec` as keywords; the defaults are the job of the thesis's chapter 4.
 
     Besides the values of a document, `robot` takes a folder with robot.toml and robot.urdf, whose
@@ -63,40 +76,20 @@ class SpecOptions(TypedDict, total=False):
     five best designs. `particles` replaces those of `optimizer`.
     """
 
-    name: str
-    robot: RobotInput
     controller: ControllerName
-    scenarios: ScenarioInput | Iterable[ScenarioInput]
     variables: Sequence[str | Variable | Document]
     fixed: Mapping[str, float | str]
-    preference: PreferenceInput
-    constraints: Sequence[ConstraintInput]
-    optimizer: OptimizerName | OptimizerSettings | Document
-    particles: int
-    iterations: int
     seed: int
     start: StartInput
     precision: Precision
     case: str | CaseSettings | Document | None
     worlds: TuningWorlds | Document | None
-    scenario_weights: Mapping[str, float]
-    scenario_aggregate: Literal["mean", "worst"]
 
 
-class ForkOptions(TypedDict, total=False):
+class ForkOptions(_SharedOptions, total=False):
     """Fields of a `ForkRequest` as keywords, with the values of `SpecOptions`."""
 
-    name: str
-    preference: PreferenceInput
-    constraints: Sequence[ConstraintInput]
-    scenario_weights: Mapping[str, float]
-    scenario_aggregate: Literal["mean", "worst"]
-    optimizer: OptimizerName | OptimizerSettings | Document
-    particles: int
-    scenarios: ScenarioInput | Iterable[ScenarioInput]
-    robot: RobotInput
     bounds: Mapping[str, tuple[float, float]]
-    iterations: int
     start_count: int
     accept_changes: bool
 

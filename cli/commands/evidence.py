@@ -98,37 +98,21 @@ def verify(
             source = full_id(jobs, source)
             view = jobs.verify(source, head=head)
             if view.verified:
-                view = _verify_evidence(jobs, source, view, replay=replay, seed=seed, head=head)
+                try:
+                    content = jobs.evidence(source)
+                except Conflict:
+                    if not view.iterations:
+                        raise
+                    # The history is too large for a file: check it in the database.
+                    view = jobs.verify(source, replay=replay, seed=seed, head=head)
+                else:
+                    view = verified(content, replay=replay, seed=seed, head=head)
     show(view, _verification(view), as_json=as_json)
     if not view.verified:
         raise CheckFailed(f"verification of {source} failed")
 
 
-def _verify_evidence(
-    jobs: Jobs,
-    job_id: str,
-    history: HistoryVerificationView,
-    *,
-    replay: int,
-    seed: int | None,
-    head: str | None,
-) -> VerificationView | HistoryVerificationView:
-    """Verify a job as evidence in this process."""
-    from gaitswarm.evidence.verify import verify as verified
-
-    try:
-        content = jobs.evidence(job_id)
-    except Conflict:
-        if not history.iterations:
-            raise
-        # The history is too large for a file: check it in the database.
-        return jobs.verify(job_id, replay=replay, seed=seed, head=head)
-    return verified(content, replay=replay, seed=seed, head=head)
-
-
-def _verification(
-    view: VerificationView | HistoryVerificationView,
-) -> Parts:
+def _verification(view: VerificationView | HistoryVerificationView) -> Parts:
     states = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not checked", "yellow")}
 
     def whose(certificate: str | None, end: str) -> str:

@@ -105,17 +105,12 @@ def synchronised(
 
 def read_measured(path: Path, robot: Robot) -> MeasuredLog:
     """Read a log; errors name file, line or row, column and unit."""
+    from gaitswarm.cli.inputs import read_file
     from gaitswarm.sim.errors import MeasuredLogError
     from gaitswarm.sim.measurement.measured_binary import parse_mcap, parse_npz
     from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="measured") from error
-    if len(content) > LARGEST_FILE:
-        raise InvalidRequest(f"{path} is larger than {LARGEST_FILE >> 20} MiB", field="measured")
+    content = read_file(path, "measured", LARGEST_FILE)
     parsed = {".npz": parse_npz, ".mcap": parse_mcap}.get(path.suffix.lower())
     try:
         return parsed(content, robot) if parsed else parse_measured_log(content.decode(), robot)

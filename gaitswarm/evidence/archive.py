@@ -42,6 +42,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.views import fields_of
 from gaitswarm.settings import place_of
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
@@ -455,15 +456,7 @@ def _run(service: JobService, job: Job) -> _Run:
     ]
     stored = store.chain_documents(job.id)
     documents: dict[str, object] = {
-        JOB: JobDocument(
-            id=job.id,
-            state=job.state,
-            created_at=job.created_at,
-            started_at=job.started_at,
-            updated_at=job.updated_at,
-            finished_at=job.finished_at,
-            budgets=budgets_of(job),
-        ),
+        JOB: JobDocument(**fields_of(JobDocument, job), budgets=budgets_of(job)),
         SPEC: spec,
         BEST: view,
         CHAIN: ChainDocument(

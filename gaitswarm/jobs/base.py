@@ -56,6 +56,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import ScenarioAggregate
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.jobs.time_left import EstimateView
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.specs import (
@@ -85,6 +86,7 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 T = TypeVar("T")
+S = TypeVar("S", bound=Spec)
 V = TypeVar("V", bound=BaseModel)
 
 if TYPE_CHECKING:
@@ -694,14 +696,9 @@ class Jobs(ABC):
         from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 
         job = self._service.job(job_id)
-        if not isinstance(job.spec, JobSpec):
-            raise InvalidRequest(
-                f"job {job_id} is of kind {job.spec.kind}; only tuning jobs are judged by a"
-                " preference",
-                field="preference",
-            )
+        only = "only tuning jobs are judged by a preference"
         spec = self._service.under(
-            job.spec,
+            spec_of(job, JobSpec, only, field="preference"),
             preference=preference,
             constraints=constraints,
             scenario_weights=scenario_weights,
@@ -906,12 +903,7 @@ class Jobs(ABC):
         from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
         jobs = [self._service.job(job_id) for job_id in job_ids]
-        spec = jobs[0].spec
-        if not isinstance(spec, CalibrationSpec):
-            raise InvalidRequest(
-                f"job {jobs[0].id} is of kind {spec.kind}; only a calibration has targets",
-                field="job_id",
-            )
+        spec = spec_of(jobs[0], CalibrationSpec, "only a calibration has targets")
         check_comparable(jobs)
         bests = None
         if spec.precision != "double":
@@ -947,13 +939,8 @@ class Jobs(ABC):
         from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 
         job = self._service.job(job_id)
-        if not isinstance(job.spec, CertificateSpec):
-            raise InvalidRequest(
-                f"job {job_id} is of kind {job.spec.kind}; only a certificate has worlds",
-                field="job_id",
-            )
-        columns = self._service.columns(job)
-        return certificate(job_id, job.spec, columns, worlds=worlds, most=most)
+        spec = spec_of(job, CertificateSpec, "only a certificate has worlds")
+        return certificate(job_id, spec, self._service.columns(job), worlds=worlds, most=most)
 
     @analysis(
         "GET /jobs/{job_id}/preferences",
@@ -972,13 +959,10 @@ class Jobs(ABC):
         from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 
         job = self._service.job(job_id)
-        if not isinstance(job.spec, PreferencesSpec):
-            raise InvalidRequest(
-                f"job {job_id} is of kind {job.spec.kind}; only a search for preferences has"
-                " candidates; to submit one, run gaitswarm preferences ID --search",
-                field="job_id",
-            )
-        return candidate_preferences(job_id, job.spec, self._service.columns(job))
+        only = "only a search for preferences has candidates"
+        remedy = "to submit one, run gaitswarm preferences ID --search"
+        spec = spec_of(job, PreferencesSpec, f"{only}; {remedy}")
+        return candidate_preferences(job_id, spec, self._service.columns(job))
 
     @analysis(
         "GET /jobs/{job_id}/export",
@@ -1130,6 +1114,13 @@ class Jobs(ABC):
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def spec_of(job: Job, kind: type[S], reason: str, *, field: str = "job_id") -> S:
+    """Return the spec of a job of a kind; refuse one of another kind."""
+    if not isinstance(job.spec, kind):
+        raise InvalidRequest(f"job {job.id} is of kind {job.spec.kind}; {reason}", field=field)
+    return job.spec
 
 
 def job_view(service: JobService, job: Job) -> JobView:

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.search.registry import (
     OptimizerName,
     OptimizerSettings,
 )
-from gaitswarm.services.optimizer.views import View, listing_name
+from gaitswarm.services.optimizer.views import View, fields_of, listing_name
 from gaitswarm.sim.case_registry import CASES
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
@@ -188,10 +188,7 @@ def plugin_views() -> list[PluginView]:
     registries: tuple[Registry[Any], ...] = (CONTROLLERS, CASES, METHODS)
     return [
         PluginView(
-            kind=plugin.kind,
-            name=plugin.name,
-            distribution=plugin.distribution,
-            version=plugin.version,
+            **fields_of(PluginView, plugin),
             state="ok" if reason is None else "refused",
             reason=reason,
         )
@@ -204,15 +201,15 @@ def plugin_views() -> list[PluginView]:
 def controller_views() -> list[ControllerView]:
     """Every controller with its variables."""
     return [
-        ControllerView(
-            name=controller.name,
-            description=controller.description,
-            variables=list(controller.variables),
-            conventions=list(controller.conventions),
-            gait_variables=list(GAIT_VARIABLES),
-            published={
-                study: design_shown(name, design) for study, design in controller.published.items()
-            },
+        ControllerView.model_validate(
+            {
+                **fields_of(ControllerView, controller),
+                "gait_variables": GAIT_VARIABLES,
+                "published": {
+                    study: design_shown(name, design)
+                    for study, design in controller.published.items()
+                },
+            }
         )
         for name, controller in CONTROLLERS.items()
     ]

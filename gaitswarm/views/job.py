@@ -30,7 +30,7 @@ from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.jobs.time_left import time_left
-from gaitswarm.services.optimizer.views import Finite, IterationIndex, JobName, View
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, JobName, View, fields_of
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.views.base import PREFIX
 
@@ -294,17 +294,7 @@ class StateView(View):
     @classmethod
     def from_job(cls, job: Job) -> StateView:
         """Make a view of a job's present state."""
-        return cls(**_fields(cls, job.progress, job))
-
-
-def _fields(view: type[View], *sources: object) -> dict[str, Any]:
-    """Read the fields of a view from the attributes of objects; the last that has one counts."""
-    return {
-        name: getattr(source, name)
-        for source in sources
-        for name in view.model_fields
-        if hasattr(source, name)
-    }
+        return cls(**fields_of(cls, job.progress, job))
 
 
 def _summary(job: Job) -> dict[str, Any]:
@@ -326,7 +316,7 @@ def _summary(job: Job) -> dict[str, Any]:
     particles = getattr(spec, "particles", 0)
     return {
         **dict.fromkeys(("kind", "precision", "optimizer", "controller")),
-        **_fields(JobSummaryView, job.labels, job.progress, rates, job),
+        **fields_of(JobSummaryView, job.labels, job.progress, rates, job),
         "scenarios": [],
         "particles": particles,
         "iterations_planned": spec.iterations,

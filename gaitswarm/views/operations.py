@@ -16,7 +16,7 @@ from gaitswarm.services.monitoring.activity import (
     WorkerHealthView,
 )
 from gaitswarm.services.optimizer.jobs.notification import Notification
-from gaitswarm.services.optimizer.views import JobName, View
+from gaitswarm.services.optimizer.views import JobName, View, fields_of
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
 
@@ -82,13 +82,8 @@ class NotificationView(View):
         """Make the view of a notification."""
         waits = notification.next_attempt_at is not None
         return cls(
-            id=notification.id,
+            **fields_of(cls, notification),
             host=urlsplit(notification.url).hostname or "",
             event=notification.document["type"],
             state="delivered" if notification.delivered_at else "waiting" if waits else "given up",
-            attempts=notification.attempts,
-            created_at=notification.created_at,
-            next_attempt_at=notification.next_attempt_at,
-            delivered_at=notification.delivered_at,
-            error=notification.error,
         )

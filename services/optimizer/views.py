@@ -69,6 +69,16 @@ class Request(_Described):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+def fields_of(view: type[BaseModel], *sources: object) -> dict[str, Any]:
+    """Read the fields of a view from the attributes of objects; the last that has one counts."""
+    return {
+        name: getattr(source, name)
+        for source in sources
+        for name in view.model_fields
+        if hasattr(source, name)
+    }
+
+
 def finite(value: float | None) -> float | None:
     """Return None for a number that JSON cannot represent."""
     return None if value is None or not math.isfinite(value) else float(value)

@@ -158,7 +158,6 @@ def finish(
     *,
     as_json: bool,
 ) -> None:
-    """Print the result of a job."""
     job = jobs.job(job_id)
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)

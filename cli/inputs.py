@@ -293,7 +293,6 @@ def _terrain(text: str) -> dict[str, Any]:
 
 
 def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...]:
-    """Return the scenarios of `scenario_data`."""
     return tuple(map(_scenario, scenario_data(text, robot)))
 
 

@@ -43,7 +43,6 @@ def name_and_value(entry: str, option: str, form: str = "NAME=VALUE") -> tuple[s
 
 
 def name_and_bounds(entry: str, option: str) -> tuple[str, tuple[str, str]]:
-    """Split NAME=LOW:HIGH."""
     name, value = name_and_value(entry, option, "NAME=LOW:HIGH")
     low, colon, high = value.partition(":")
     if not colon:
@@ -74,7 +73,6 @@ def completed_all(context: typer.Context, ids: list[str]) -> list[str]:
 
 
 def completed(context: typer.Context, text: str | None) -> str | None:
-    """Complete the prefix of an id."""
     return None if text is None else completed_all(context, [text])[0]
 
 

@@ -35,7 +35,6 @@ class Progress:
     _next_line: float = field(default=0.0, init=False)
 
     def show(self, iteration: Iteration | IterationView) -> None:
-        """Show a committed iteration."""
         known = (self.job.least_violation, iteration.least_violation)
         least_violation = min((value for value in known if value is not None), default=None)
         done = {
@@ -71,7 +70,6 @@ class Progress:
         note(f"{whole}{spent.done}/{spent.planned} {spent.unit}: {best}, {speed}, {left} left")
 
     def remark(self, text: str) -> None:
-        """Show a line of text."""
         if self.bar is None:
             note(text)
         else:

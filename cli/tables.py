@@ -56,7 +56,6 @@ def table(
     title: str | None = None,
     gap: int = 2,
 ) -> Table:
-    """Return a table."""
     from rich.table import Table
 
     made = Table(box=None, title=title, title_justify="left", padding=(0, gap, 0, 0))
@@ -94,7 +93,6 @@ def percent(share: float | None, digits: int = 4) -> str:
 
 
 def interval(index: Any, digits: int = 3) -> tuple[str, str]:
-    """Format the value and the interval of an index."""
     if index is None:
         return MISSING, MISSING
     return number(
@@ -265,7 +263,6 @@ def search_line(best: BestView) -> Iterator[str]:
 
 
 def job_parts(job: JobView) -> Parts:
-    """Yield a job's state, progress and best design."""
     rate, time_left = job.evaluations_per_second, None
     if not job.state.terminal:
         time_left = job.eta_basis if job.eta_seconds is None else duration(job.eta_seconds)
@@ -302,7 +299,6 @@ def job_parts(job: JobView) -> Parts:
 
 
 def best_parts(best: BestView, job: JobView) -> Parts:
-    """Yield a job's best design and its results."""
     yield design_table(job.spec, {"best": best.design})
     yield results_table({"best": best.scenarios}, job.objectives)
     if job.measurements:

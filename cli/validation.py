@@ -222,7 +222,6 @@ def alignment(comparison: Comparison) -> str:
 
 
 def remarks(comparison: Comparison) -> list[str]:
-    """Return caveats of a comparison."""
     notes = []
     if comparison.synthetic:
         notes.append("the measured log is SYNTHETIC: this tests the toolkit, not the model")

@@ -134,7 +134,6 @@ class FirmwareView(View):
 def firmware_view(
     request: FirmwareRequest, firmware: Firmware, folder: str | None = None
 ) -> FirmwareView:
-    """Describe firmware."""
     parts = {"direct": firmware.law.direct, "integrated": firmware.law.integrated}
     memory = firmware.memory
     return FirmwareView(
@@ -244,7 +243,6 @@ class TrajectoriesRequest(ScenariosRequest):
     held: bool = Field(default=True, description="Whether held joints have columns as well.")
 
     def setpoints(self) -> dict[str, Setpoints]:
-        """Desired angles by scenario."""
         self.check_design()
         self.check_gaits()
         robot = load_robot(self.robot)

@@ -104,7 +104,6 @@ class RobotDefaults:
         return list(self.own_scenarios.values()) or [scenario.name for scenario in SCENARIOS]
 
     def of_controller(self, controller: object) -> dict[str, Any]:
-        """What a job of this controller has."""
         if controller in (None, self.document.get("controller")):
             return dict(self.document)
         return {k: v for k, v in self.document.items() if k not in ("variables", "fixed")}
@@ -535,7 +534,6 @@ class MeshFileView(View):
 
 
 def mesh_views(folders: Sequence[Path], digest: str) -> list[MeshFileView]:
-    """Describe the meshes of a robot."""
     return [
         MeshFileView(
             name=name,

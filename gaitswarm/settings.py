@@ -237,7 +237,6 @@ def default_database() -> Path:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is a loopback address."""
     if host == "localhost":
         return True
     try:
@@ -252,5 +251,4 @@ def _source(field: str, given: dict[str, Any]) -> str:
 
 
 def variable_of(field: str) -> str:
-    """Environment variable of a setting."""
     return f"GAITSWARM_{field.upper()}"

@@ -361,7 +361,6 @@ def simulate(
 
 
 def run_simulation(request: SimulationRequest) -> SimulationView:
-    """Simulate the request's design in every scenario."""
     request.check_walks()
     robot = load_robot(request.robot)
     design = np.array([tuple(request.numbers.values())], dtype=np.float64)

@@ -163,7 +163,6 @@ class EvaluationTable(Table):
 
 
 def joined(pieces: Sequence[EvaluationColumns]) -> EvaluationColumns:
-    """Concatenate evaluations."""
     arrays = zip(*(piece.arrays for piece in pieces), strict=True)
     return EvaluationColumns(*(np.concatenate(parts) for parts in arrays))
 

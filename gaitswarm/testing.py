@@ -313,7 +313,6 @@ def best(name: str, seed: int) -> float:
 
 
 def bits(positions: Iterable[Floats]) -> list[bytes]:
-    """Positions as bytes."""
     return [position.tobytes() for position in positions]
 
 

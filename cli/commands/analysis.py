@@ -79,7 +79,6 @@ def rank(
 
 
 def _ranking(ranking: RankingView) -> Parts:
-    """Yield the best designs by another preference, with their ranks before."""
     columns = [">rank", "before", "design", "fitness", "before"]
     maximized = any(design.figure_of_merit is not None for design in ranking.top)
     rows = (
@@ -133,7 +132,6 @@ def front(
 
 
 def _front(view: FrontView) -> Parts:
-    """Yield knees, the best in each objective, and winners of preferences."""
     heads = [f"{SHORT[o.name]}\n{o.unit}" for o in view.objectives]
     rows = (
         (label, place(design), *map(number, design.objectives.values()), number(design.fitness))
@@ -289,7 +287,6 @@ def failures(job_id: JobId, *, jobs: Jobs) -> Printed:
 
 
 def _failures(view: FailuresView) -> Parts:
-    """Yield statuses by case, most failures first, and the share of failed designs."""
     rows = (
         (
             *(case.case, case.failed, case.alone),
@@ -352,7 +349,6 @@ _BOUGHT: Final = ("torque", "acceleration", "angular_acceleration", "energy", "s
 
 
 def _candidates(view: CandidatePreferencesView) -> Parts:
-    """Yield what each candidate preference buys, the recommended one first."""
     rows = [
         [
             *("reference", *[MISSING] * 5),
@@ -380,7 +376,6 @@ def _candidates(view: CandidatePreferencesView) -> Parts:
 
 
 def _fits(view: PreferenceForView) -> Parts:
-    """Yield preferences that suit a design, one per set of biases, best first."""
     rows = (
         (
             ", ".join("the job" if owner == "job" else owner for owner in fit.biases_of),
@@ -398,7 +393,6 @@ def _fits(view: PreferenceForView) -> Parts:
 
 
 def _verdict(view: PreferenceForView) -> str:
-    """State in a sentence whether a design wins under any preference."""
     chosen, best = place(view.chosen), view.fits[0]
     if view.wins:
         return f"design {chosen} wins{_by(best)} under {best.preference.model_dump_json()}"

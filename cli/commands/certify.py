@@ -254,7 +254,6 @@ def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> d
 
 
 def _range(entry: str) -> tuple[str, dict[str, str]]:
-    """Return name and variable of NAME=LOW:HIGH."""
     from gaitswarm.sim.worlds.perturbations import PERTURBATIONS
 
     name, (low, high) = name_and_bounds(entry, "range")
@@ -271,7 +270,6 @@ _COMPARED: Final = ("torque", "acceleration", "angular_acceleration", "energy", 
 
 
 def _parts(view: CertificateView, place: str) -> Parts:
-    """Yield the results of a certificate."""
     yield _by_scenario(view)
     yield (
         f"{view.worlds} worlds of seed {view.seed}; failures in {_chance(view.failed)}, falls in"
@@ -359,7 +357,6 @@ def _engine_table(name: str, engine: ComparedEngineView) -> Table:
 
 
 def _replayed(spec: CertificateSpec, world: int, log: Path | None) -> tuple[dict[str, Any], Parts]:
-    """Simulate a certificate's design in one world."""
     from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
 

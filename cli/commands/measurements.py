@@ -266,8 +266,6 @@ def _parameters(view: IdentifiabilityView, truth: Mapping[str, float]) -> Parts:
 
 
 def parameters_table(view: IdentifiabilityView, truth: Mapping[str, float]) -> Table:
-    """Return a table of best and true values, and of intervals' widths in percent."""
-
     def width(p: ParameterView, threshold: float) -> str:
         interval = p.intervals[view.thresholds.index(threshold)]
         return f"{100.0 * (interval.high - interval.low) / (p.high - p.low):.0f}"
@@ -473,8 +471,6 @@ def _targets(
 
 
 def _calibrated(reached: TargetsView, parameters: IdentifiabilityView) -> Parts:
-    """Yield targets, simulated values and differences; then the fitted parameters."""
-
     def values(target: ReachedView | None) -> tuple[str, str]:
         off = None if target is None else target.difference
         simulated = None if target is None else target.simulated

@@ -311,7 +311,6 @@ def _gaits(view: GaitsView) -> str:
 
 
 def diagram(item: GaitView) -> str:
-    """Return a gait's footfall diagram."""
     if not item.suits:
         return f"{item.name}: for {' or '.join(map(str, item.legs))} legs\n"
     lines = [f"{leg:14} {columns}" for leg, columns in item.support.items()]

@@ -73,7 +73,6 @@ class BadArchive(ValueError):
 
 
 def zipped(members: Mapping[str, bytes]) -> bytes:
-    """Write an archive."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, content in sorted(members.items()):
@@ -196,7 +195,6 @@ class Manifest(BaseModel):
 
 
 def archived(members: Mapping[str, bytes]) -> bytes:
-    """Write an archive."""
     files = {name: hashlib.sha256(member).hexdigest() for name, member in sorted(members.items())}
     return zipped({**members, MANIFEST: to_json(Manifest(files=files), indent=2) + b"\n"})
 
@@ -254,7 +252,6 @@ class Evidence:
 
 
 def read_evidence(members: Mapping[str, bytes]) -> Evidence:
-    """Read the members of an archive."""
     spec = _parsed(SPECS.validate_python, members, SPEC)
     job = _parsed(JobDocument.model_validate, members, JOB)
     chain = _parsed(ChainDocument.model_validate, members, CHAIN)
@@ -549,7 +546,6 @@ def _asks(spec: AnySpec, links: Sequence[Link]) -> bytes:
 
 
 def robot_members(sources: Sequence[RobotSource]) -> dict[str, bytes]:
-    """The resolved robots."""
     files = {}
     for number, robot in enumerate(map(load_robot, sources)):
         description = robot.description.model_dump_json()
@@ -587,7 +583,6 @@ def page(
     certificates: Sequence[CertificateOnPage],
     files: Sequence[str],
 ) -> str:
-    """Write the page."""
     import jinja2
 
     environment = jinja2.Environment(

@@ -171,17 +171,14 @@ class Operation:
 
     @property
     def result(self) -> Any:
-        """Type of the answer."""
         return self.hints["return"]
 
     @cached_property
     def adapter(self) -> TypeAdapter[Any]:
-        """Reads and writes the answer as JSON."""
         return TypeAdapter(self.result)
 
     @cached_property
     def path_names(self) -> tuple[str, ...]:
-        """Parameters of the path."""
         return tuple(re.findall(r"\{(\w+)\}", self.path))
 
     @cached_property

@@ -37,7 +37,6 @@ class CatalogueView(View, Generic[T]):
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Name the schema of a list."""
         return listing_name(params, "List")
 
 
@@ -171,7 +170,6 @@ def optimizers() -> list[OptimizerView]:
 
 
 def case_views() -> list[CaseView]:
-    """Every case that plug-ins bring."""
     return [
         CaseView(
             name=name,
@@ -199,7 +197,6 @@ def plugin_views() -> list[PluginView]:
 
 
 def controller_views() -> list[ControllerView]:
-    """Every controller with its variables."""
     return [
         ControllerView.model_validate(
             {

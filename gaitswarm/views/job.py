@@ -214,7 +214,6 @@ class JobSummaryView(View):
 
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:
-        """Make a summary without a further query."""
         return cls.model_validate(_summary(job))
 
 
@@ -248,7 +247,6 @@ class JobView(JobSummaryView):
 
     @property
     def spec(self) -> AnySpec:
-        """The spec."""
         if self.stored_spec is None:
             raise Unreadable(f"job {self.id}: {self.error}")
         return self.stored_spec
@@ -293,7 +291,6 @@ class StateView(View):
 
     @classmethod
     def from_job(cls, job: Job) -> StateView:
-        """Make a view of a job's present state."""
         return cls(**fields_of(cls, job.progress, job))
 
 

@@ -79,7 +79,6 @@ class NotificationView(View):
 
     @classmethod
     def from_notification(cls, notification: Notification) -> NotificationView:
-        """Make the view of a notification."""
         waits = notification.next_attempt_at is not None
         return cls(
             **fields_of(cls, notification),

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import gc
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from copy import copy
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, cast, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    TypeVar,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import typer
 
 from gaitswarm.cli.output import Printed, show
+from gaitswarm.docstrings import docstring_of
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 
 if TYPE_CHECKING:
@@ -262,96 +274,53 @@ class GivenOptions:
 
 @dataclass(frozen=True, slots=True)
 class SpecOptions(GivenOptions):
-    """Options of commands that submit a job; None keeps the value of the spec file."""
+    """Options of commands that submit a job; None keeps the value of the spec file.
 
-    spec: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Job spec as JSON; `-` reads standard input. Default: the chapter-4 job.",
-        ),
-    ] = None
-    iterations: Annotated[
-        int | None, typer.Option(help="Budget, in iterations of --particles designs.")
-    ] = None
-    particles: Annotated[int | None, typer.Option(help="Maximum designs per iteration.")] = None
-    optimizer: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Search method: cma-es, pso, auto, ...; `gaitswarm optimizers` lists all.",
-        ),
-    ] = None
-    optimizer_settings: Annotated[
-        str | None,
-        typer.Option(
-            metavar="JSON|FILE",
-            help="Settings of the method, such as '{\"sigma\": 0.4}'.",
-        ),
-    ] = None
-    seed: Annotated[int | None, typer.Option(help="Seed of all random numbers.")] = None
+    Args:
+        spec: Job spec as JSON; `-` reads standard input. Default: the chapter-4 job.
+        iterations: Budget, in iterations of --particles designs.
+        particles: Maximum designs per iteration.
+        optimizer: Search method: cma-es, pso, auto, ...; `gaitswarm optimizers` lists all.
+        optimizer_settings: Settings of the method, such as '{"sigma": 0.4}'.
+        seed: Seed of all random numbers.
+        start_from: Start from the best designs of earlier jobs, or from those of a file.
+        start_count: Number of start designs [default: 5 of jobs, all of a file].
+        preference: Weighting of objectives: A, B, C or chapter-3 (eq. 3.1).
+        scenarios: Names, numbers or FILE.json, separated by commas.
+        case: Evaluate designs by a plug-in's case, instead of the simulator, by its name or
+            settings; `gaitswarm cases` lists all.
+        with_gait: Also search the gait: stride, height, duty factor, FIR filter and, unless the
+            scenarios differ in it, cycle time.
+        worlds: Evaluate every design in this many worlds that differ from the model.
+        aggregate: With --worlds: aggregation of utilities over worlds [default: cvar].
+        level: With --worlds: level of the quantile or cvar [default: 0.75].
+        worlds_seed: With --worlds: seed of the worlds [default: 1].
+    """
+
+    spec: Annotated[Path | None, typer.Option(metavar="FILE")] = None
+    iterations: int | None = None
+    particles: int | None = None
+    optimizer: Annotated[str | None, typer.Option(metavar="NAME")] = None
+    optimizer_settings: Annotated[str | None, typer.Option(metavar="JSON|FILE")] = None
+    seed: int | None = None
     start_from: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ID[,ID]|FILE.csv",
-            callback=completed_start,
-            help="Start from the best designs of earlier jobs, or from those of a file.",
-        ),
+        str | None, typer.Option(metavar="ID[,ID]|FILE.csv", callback=completed_start)
     ] = None
-    start_count: Annotated[
-        int | None,
-        typer.Option(min=1, help="Number of start designs [default: 5 of jobs, all of a file]."),
-    ] = None
-    preference: Annotated[
-        str | None, typer.Option(help="Weighting of objectives: A, B, C or chapter-3 (eq. 3.1).")
-    ] = None
+    start_count: Annotated[int | None, typer.Option(min=1)] = None
+    preference: str | None = None
     constraint: ConstraintOption = None
     no_worse_than: NoWorseThan = None
-    scenarios: Annotated[
-        str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
-    ] = None
+    scenarios: str | None = None
     terrain: TerrainOption = None
     controller: ControllerOption = None
-    case: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|JSON|FILE",
-            help="Evaluate designs by a plug-in's case, instead of the simulator, by its name or"
-            " settings; `gaitswarm cases` lists all.",
-        ),
-    ] = None
-    with_gait: Annotated[
-        bool | None,
-        typer.Option(
-            "--with-gait",
-            help="Also search the gait: stride, height, duty factor, FIR filter and, unless the"
-            " scenarios differ in it, cycle time.",
-        ),
-    ] = None
+    case: Annotated[str | None, typer.Option(metavar="NAME|JSON|FILE")] = None
+    with_gait: Annotated[bool | None, typer.Option("--with-gait")] = None
     scenario_weight: ScenarioWeight = None
     scenario_aggregate: ScenarioAggregate = None
-    worlds: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            max=100,
-            help="Evaluate every design in this many worlds that differ from the model.",
-        ),
-    ] = None
-    aggregate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="mean|quantile|worst|cvar",
-            help="With --worlds: aggregation of utilities over worlds [default: cvar].",
-        ),
-    ] = None
-    level: Annotated[
-        float | None,
-        typer.Option(help="With --worlds: level of the quantile or cvar [default: 0.75]."),
-    ] = None
-    worlds_seed: Annotated[
-        int | None, typer.Option(min=0, help="With --worlds: seed of the worlds [default: 1].")
-    ] = None
+    worlds: Annotated[int | None, typer.Option(min=1, max=100)] = None
+    aggregate: Annotated[str | None, typer.Option(metavar="mean|quantile|worst|cvar")] = None
+    level: float | None = None
+    worlds_seed: Annotated[int | None, typer.Option(min=0)] = None
     robot: RobotOption = None
     precision: Precision = None
     name: JobName = None
@@ -359,55 +328,34 @@ class SpecOptions(GivenOptions):
 
 @dataclass(frozen=True, slots=True)
 class WorkerOptions:
-    """Options of commands that run jobs, named as the settings that they override."""
+    """Options of commands that run jobs, named as the settings that they override.
+
+    Args:
+        evaluator: Where simulations run. ray: on Ray; in-process: in threads; auto: on Ray with an
+            address and in servers, otherwise in threads. [env: GAITSWARM_EVALUATOR; default: auto]
+        cpus: Parallel simulations on this machine. [env: GAITSWARM_CPUS; default: all cores]
+        ray_address: Ray cluster for all simulations: HOST:PORT of its head, or auto on one of its
+            nodes. [env: GAITSWARM_RAY_ADDRESS]
+        cache: Reuse earlier simulations of the same designs in the database; results do not change.
+            [env: GAITSWARM_CACHE; default: cache]
+    """
 
     db: Db = None
-    evaluator: Annotated[
-        str | None,
-        typer.Option(
-            help="Where simulations run. ray: on Ray; in-process: in threads; auto: on Ray with an"
-            " address and in servers, otherwise in threads. [env: GAITSWARM_EVALUATOR; default:"
-            " auto]",
-        ),
-    ] = None
-    cpus: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Parallel simulations on this machine. [env: GAITSWARM_CPUS; default: all cores]",
-        ),
-    ] = None
-    ray_address: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Ray cluster for all simulations: HOST:PORT of its head, or auto on one of its"
-            " nodes. [env: GAITSWARM_RAY_ADDRESS]",
-        ),
-    ] = None
-    cache: Annotated[
-        bool | None,
-        typer.Option(
-            "--cache/--no-cache",
-            help="Reuse earlier simulations of the same designs in the database; results do not"
-            " change. [env: GAITSWARM_CACHE; default: cache]",
-        ),
-    ] = None
+    evaluator: str | None = None
+    cpus: Annotated[int | None, typer.Option(min=1)] = None
+    ray_address: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None
+    cache: Annotated[bool | None, typer.Option("--cache/--no-cache")] = None
 
 
 @dataclass(frozen=True, slots=True)
 class RunnerOptions(WorkerOptions):
-    """Options of commands that run queued jobs."""
+    """Options of commands that run queued jobs.
 
-    concurrent_jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            min=1,
-            max=256,
-            help="Jobs to run in parallel. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]",
-        ),
-    ] = None
+    Args:
+        concurrent_jobs: Jobs to run in parallel. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]
+    """
+
+    concurrent_jobs: Annotated[int | None, typer.Option("--jobs", min=1, max=256)] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -429,20 +377,21 @@ def expanded(command: Callable[..., Any]) -> Callable[..., None]:
 
     Dataclasses among its parameters become single options. A parameter `jobs: Jobs` becomes the
     options of `Place`, which is open until the result is printed. A command that returns `Printed`
-    gets --json.
+    gets --json. Help texts that an annotation does not have are those of the docstring's "Args".
     """
     annotations = get_type_hints(command, None, {"Jobs": Place}, include_extras=True)
     prints = annotations.pop("return") == Printed
     groups = {name: kind for name, kind in annotations.items() if is_dataclass(kind)}
     parameters: list[inspect.Parameter] = []
-    for name, parameter in inspect.signature(command).parameters.items():
-        if name in groups:
-            parameters += _parameters(cast(type, groups[name]))
+    for parameter in _parameters(command, annotations):
+        if parameter.name in groups:
+            kind = cast(type, groups[parameter.name])
+            parameters += _parameters(kind, get_type_hints(kind, include_extras=True))
         else:
-            parameters.append(parameter.replace(annotation=annotations[name]))
+            parameters.append(parameter)
     if prints:
-        kind = inspect.Parameter.KEYWORD_ONLY
-        parameters.append(inspect.Parameter("as_json", kind, default=False, annotation=Json))
+        json = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False)
+        parameters.append(json.replace(annotation=Json))
 
     @wraps(command)
     def called(**values: Any) -> None:
@@ -460,12 +409,26 @@ def expanded(command: Callable[..., Any]) -> Callable[..., None]:
 
     by_name = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
     called.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
+    called.__doc__ = docstring_of(command).text
     called.__annotations__ = {parameter.name: parameter.annotation for parameter in by_name}
     return called
 
 
-def _parameters(group: type) -> list[inspect.Parameter]:
-    """Return the parameters of a dataclass with resolved annotations."""
-    annotations = get_type_hints(group, include_extras=True)
-    parameters = inspect.signature(group).parameters
-    return [p.replace(annotation=annotations[name]) for name, p in parameters.items()]
+def _parameters(
+    command: Callable[..., Any], annotations: dict[str, Any]
+) -> Iterator[inspect.Parameter]:
+    """Yield the parameters of a command or a dataclass, with help texts of its docstring."""
+    documented = reversed(command.__mro__) if isinstance(command, type) else [command]
+    texts = {n: text for part in documented for n, text in docstring_of(part).arguments.items()}
+    for name, parameter in inspect.signature(command).parameters.items():
+        annotation = annotations[name]
+        if name in texts:
+            kind, option = annotation, typer.Option()
+            if parameter.default is inspect.Parameter.empty:
+                option = typer.Argument()
+            if get_origin(annotation) is Annotated:
+                kind, option = get_args(annotation)
+            option = copy(option)
+            option.help = texts[name]
+            annotation = Annotated[kind, option]
+        yield parameter.replace(annotation=annotation)

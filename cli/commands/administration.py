@@ -92,26 +92,21 @@ def restore(
 
 
 def prune(
-    older_than: Annotated[
-        float | None,
-        typer.Option(min=0.0, metavar="DAYS", help="Also delete jobs that ended earlier."),
-    ] = None,
-    state: Annotated[
-        Literal["succeeded", "failed", "cancelled"] | None,
-        typer.Option(help="With --older-than: only jobs in this state [default: all]."),
-    ] = None,
-    audit_older_than: Annotated[
-        float | None,
-        typer.Option(min=0.0, metavar="DAYS", help="Also remove older audit entries."),
-    ] = None,
-    trust_clock: Annotated[
-        bool, typer.Option("--trust-clock", help="Also after a jump of the clock.")
-    ] = False,
+    older_than: Annotated[float | None, typer.Option(min=0.0, metavar="DAYS")] = None,
+    state: Literal["succeeded", "failed", "cancelled"] | None = None,
+    audit_older_than: Annotated[float | None, typer.Option(min=0.0, metavar="DAYS")] = None,
+    trust_clock: Annotated[bool, typer.Option("--trust-clock")] = False,
     db: Db = None,
 ) -> None:
     """Remove recordings older than a day that no job uses, and free their space.
 
     With --older-than, also jobs, except those that are kept or have active forks.
+
+    Args:
+        older_than: Also delete jobs that ended earlier.
+        state: With --older-than: only jobs in this state [default: all].
+        audit_older_than: Also remove older audit entries.
+        trust_clock: Also after a jump of the clock.
     """
     from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
     from gaitswarm.services.optimizer.store import maintenance
@@ -153,16 +148,15 @@ Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the token, ow
 
 def create(
     name: Name,
-    scope: Annotated[
-        Literal["read", "submit", "admin"],
-        typer.Option(
-            help="read: read everything; submit: also submit jobs and control them; admin: control"
-            " all jobs."
-        ),
-    ] = "submit",
+    scope: Literal["read", "submit", "admin"] = "submit",
     db: Db = None,
 ) -> Printed:
-    """Create a token; its secret is printed once and never stored."""
+    """Create a token; its secret is printed once and never stored.
+
+    Args:
+        scope: read: read everything; submit: also submit jobs and control them; admin: control all
+            jobs.
+    """
     from gaitswarm.services.optimizer.access import Scope
 
     with _store(db, create=True) as store:
@@ -204,20 +198,17 @@ def revoke(name: Name, db: Db = None) -> Printed:
 
 
 def audit(
-    job: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ID",
-            callback=completed,
-            help="Only entries of this job; give the full id of a deleted one.",
-        ),
-    ] = None,
-    limit: Annotated[int, typer.Option(min=1, max=10_000, help="Maximum number of entries.")] = 50,
+    job: Annotated[str | None, typer.Option(metavar="ID", callback=completed)] = None,
+    limit: Annotated[int, typer.Option(min=1, max=10_000)] = 50,
     db: Db = None,
 ) -> Printed:
     """Show who submitted, controlled and deleted jobs and created tokens, newest first.
 
     Reads the database; administrators of a server can also read /v1/audit.
+
+    Args:
+        job: Only entries of this job; give the full id of a deleted one.
+        limit: Maximum number of entries.
     """
     with _store(db, create=True) as store:
         entries = store.audit(job_id=job, limit=limit).items

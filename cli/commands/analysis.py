@@ -47,24 +47,23 @@ if TYPE_CHECKING:
 
 def rank(
     job_id: JobId,
-    preference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|JSON",
-            help='A, B, C, chapter-3, or JSON: {"bias": [five or six numbers], "exponent": [as'
-            " many]} [default: the job's].",
-        ),
-    ] = None,
+    preference: Annotated[str | None, typer.Option(metavar="NAME|JSON")] = None,
     constraint: ConstraintOption = None,
     no_worse_than: NoWorseThan = None,
     no_constraints: NoConstraints = False,
     scenario_weight: ScenarioWeight = None,
     scenario_aggregate: ScenarioAggregate = None,
-    top: Annotated[int, typer.Option(help="Number of designs to show.")] = 20,
+    top: int = 20,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """Rank a job's stored designs by another preference, other constraints or weights."""
+    """Rank a job's stored designs by another preference, other constraints or weights.
+
+    Args:
+        preference: A, B, C, chapter-3, or JSON: {"bias": [five or six numbers], "exponent": [as
+            many]} [default: the job's].
+        top: Number of designs to show.
+    """
     from gaitswarm.cli.inputs import constraint_choice, preference_choice, weights_choice
 
     ranking = jobs.ranking(
@@ -100,13 +99,8 @@ def _ranking(ranking: RankingView) -> Parts:
 
 def front(
     job_id: JobId,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE.csv", help="Also write the front's designs."),
-    ] = None,
-    most: Annotated[
-        int, typer.Option(help="Maximum number of designs with --json and --output.")
-    ] = 1000,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE.csv")] = None,
+    most: int = 1000,
     constraint: ConstraintOption = None,
     no_worse_than: NoWorseThan = None,
     no_constraints: NoConstraints = False,
@@ -117,6 +111,10 @@ def front(
 
     Lists knees, the best design in each objective, under A, B and C, and under the job's
     preference, and the hypervolume.
+
+    Args:
+        output: Also write the front's designs.
+        most: Maximum number of designs with --json and --output.
     """
     from gaitswarm.cli.inputs import constraint_choice
 
@@ -304,29 +302,21 @@ def _failures(view: FailuresView) -> Parts:
 
 def preferences(
     job_id: JobId,
-    for_design: Annotated[
-        str | None,
-        typer.Option(
-            "--for",
-            metavar="ITERATION.DESIGN",
-            help="Find the preference under which this design of a tuning job wins, without"
-            " simulation.",
-        ),
-    ] = None,
+    for_design: Annotated[str | None, typer.Option("--for", metavar="ITERATION.DESIGN")] = None,
     *,
-    search: Annotated[
-        bool,
-        typer.Option(
-            help="Submit a search for preferences around a tuning job; it judges the design that is"
-            " optimal under each.",
-        ),
-    ] = False,
+    search: bool = False,
     jobs: Jobs,
 ) -> Printed:
     """Show what each preference of a search buys (thesis 4.5, 4.6), or submit such a search.
 
     A search judges the optimum of each preference by its robustness and its evenness over the
     scenarios. With --for, finds the preference that makes a design the best.
+
+    Args:
+        for_design: Find the preference under which this design of a tuning job wins, without
+            simulation.
+        search: Submit a search for preferences around a tuning job; it judges the design that is
+            optimal under each.
     """
     from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
     from gaitswarm.services.optimizer.jobs.kinds.preferences import search_document

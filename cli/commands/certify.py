@@ -44,90 +44,46 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class CertificateOptions(GivenOptions):
-    """Options that make the spec; None keeps the value of an earlier certificate."""
+    """Options that make the spec; None keeps the value of an earlier certificate.
 
-    worlds: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Number of worlds. [default: 1000]")
-    ] = None
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the worlds. [default: 1]")] = None
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas. Default: those of the job, of"
-            " the robot's folder or of table 4.2, and at least two held-out ones, for a total of"
-            " eight."
-        ),
-    ] = None
+    Args:
+        worlds: Number of worlds. [default: 1000]
+        seed: Seed of the worlds. [default: 1]
+        scenarios: Names, numbers or FILE.json, separated by commas. Default: those of the job, of
+            the robot's folder or of table 4.2, and at least two held-out ones, for a total of
+            eight.
+        ranges: Draw this perturbation from another range; repeatable.
+        fixed: Fix this perturbation in all worlds; repeatable.
+        only: Draw only these perturbations; others stay nominal. Default: all.
+        engines: Also simulate the nominal world in this engine and show the differences: MuJoCo
+            with our contact laws, or with its own contacts. Repeatable; needs pip install
+            'gaitswarm[mujoco]'.
+    """
+
+    worlds: Annotated[int | None, typer.Option(min=1, max=100_000)] = None
+    seed: Annotated[int | None, typer.Option(min=0)] = None
+    scenarios: str | None = None
     terrain: TerrainOption = None
-    ranges: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--range",
-            metavar="NAME=LOW:HIGH",
-            help="Draw this perturbation from another range; repeatable.",
-        ),
-    ] = None
-    fixed: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Fix this perturbation in all worlds; repeatable.",
-        ),
-    ] = None
-    only: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="Draw only these perturbations; others stay nominal. Default: all.",
-        ),
-    ] = None
+    ranges: Annotated[list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH")] = None
+    fixed: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE")] = None
+    only: Annotated[str | None, typer.Option(metavar="NAME,...")] = None
     controller: ControllerOption = None
     robot: RobotOption = None
     preference: PreferenceOption = None
     precision: Precision = None
     engines: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--engine",
-            metavar="mujoco|mujoco-contacts",
-            help="Also simulate the nominal world in this engine and show the differences: MuJoCo"
-            " with our contact laws, or with its own contacts. Repeatable; needs pip install"
-            " 'gaitswarm[mujoco]'.",
-        ),
+        list[str] | None, typer.Option("--engine", metavar="mujoco|mujoco-contacts")
     ] = None
     name: JobName = None
 
 
 def certify(
-    design: Annotated[
-        str,
-        typer.Argument(
-            metavar="DESIGN|ID",
-            help="A published design, as published:A; a file with a JSON object {variable: value},"
-            " or `-` for standard input; the id of a job, for its best with its robot, controller"
-            " and preference; or the id of a certificate to continue.",
-        ),
-    ],
+    design: Annotated[str, typer.Argument(metavar="DESIGN|ID")],
     options: CertificateOptions,
     *,
-    most: Annotated[int, typer.Option(min=0, max=1000, help="Worst worlds to list.")] = 5,
-    replay: Annotated[
-        int | None,
-        typer.Option(
-            metavar="K",
-            min=0,
-            max=99_999,
-            help="Run no certificate: simulate the design in world K again and show its results.",
-        ),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.npz",
-            help="With --replay: write 500 Hz logs as NumPy arrays.",
-        ),
-    ] = None,
+    most: Annotated[int, typer.Option(min=0, max=1000)] = 5,
+    replay: Annotated[int | None, typer.Option(metavar="K", min=0, max=99_999)] = None,
+    log: Annotated[Path | None, typer.Option(metavar="FILE.npz")] = None,
     workers: WorkerOptions,
 ) -> Printed:
     """Test a design in many worlds: how often it fails, and how bad it gets.
@@ -135,6 +91,14 @@ def certify(
     A world is one sample of the model's uncertainties: friction, masses, battery, sensors. With
     one seed, world K is the same for every design. Run the same command to resume; with more
     worlds, only the missing ones are simulated.
+
+    Args:
+        design: A published design, as published:A; a file with a JSON object {variable: value}, or
+            `-` for standard input; the id of a job, for its best with its robot, controller and
+            preference; or the id of a certificate to continue.
+        most: Worst worlds to list.
+        replay: Run no certificate: simulate the design in world K again and show its results.
+        log: With --replay: write 500 Hz logs as NumPy arrays.
     """
     from gaitswarm.cli.embedded import Embedded
 

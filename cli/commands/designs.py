@@ -38,45 +38,30 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    design: Annotated[
-        str,
-        typer.Option(
-            metavar="JSON|FILE|published:NAME|job:ID",
-            help="JSON object {variable: value} of controller variables and optional gait"
-            " parameters, or with one under `design`; a published design, as published:A; or the"
-            " best of a job.",
-        ),
-    ],
+    design: Annotated[str, typer.Option(metavar="JSON|FILE|published:NAME|job:ID")],
     controller: ControllerOption = None,
-    scenario: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas, or all; of the robot's folder"
-            " if it has scenarios, else of table 4.2 [default: the job's, else all]."
-        ),
-    ] = None,
+    scenario: str | None = None,
     terrain: TerrainOption = None,
     trajectory: TrajectoryOption = None,
     preference: PreferenceOption = None,
-    world: Annotated[
-        str | None,
-        typer.Option(
-            metavar="JSON|FILE",
-            help="Perturbations of the model, such as"
-            ' \'{"friction_factor": 0.7, "slope_added": 2}\', or an object with them under'
-            " `values`, as printed by `certify --json`.",
-        ),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.npz", help="Write 500 Hz logs as NumPy arrays."),
-    ] = None,
+    world: Annotated[str | None, typer.Option(metavar="JSON|FILE")] = None,
+    log: Annotated[Path | None, typer.Option(metavar="FILE.npz")] = None,
     robot: RobotOption = None,
     precision: Precision = None,
     *,
     place: Place,
 ) -> Printed:
-    """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
+    """Simulate one design and show its objectives and fitness; a fall is a result, not an error.
+
+    Args:
+        design: JSON object {variable: value} of controller variables and optional gait parameters,
+            or with one under `design`; a published design, as published:A; or the best of a job.
+        scenario: Names, numbers or FILE.json, separated by commas, or all; of the robot's folder if
+            it has scenarios, else of table 4.2 [default: the job's, else all].
+        world: Perturbations of the model, such as '{"friction_factor": 0.7, "slope_added": 2}', or
+            an object with them under `values`, as printed by `certify --json`.
+        log: Write 500 Hz logs as NumPy arrays.
+    """
     from gaitswarm.cli.inputs import given_design, json_object, on_terrain, robot_defaults
     from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
     from gaitswarm.simulation import run_simulation
@@ -142,25 +127,12 @@ def _simulated(view: SimulationView) -> Parts:
 
 
 def robustness(
-    design: Annotated[
-        str,
-        typer.Argument(
-            metavar="DESIGN|ID",
-            help="Design file, `-`, or published:NAME, as for `simulate`; or a job's id for its"
-            " best.",
-        ),
-    ],
-    samples: Annotated[int, typer.Option(help="Designs to sample around each given one.")] = 256,
-    radius: Annotated[
-        float, typer.Option(help="Radius of the sample, as a share of each variable's bounds.")
-    ] = 0.02,
-    seed: Annotated[int, typer.Option(help="Seed of the sample.")] = 1,
+    design: Annotated[str, typer.Argument(metavar="DESIGN|ID")],
+    samples: int = 256,
+    radius: float = 0.02,
+    seed: int = 1,
     scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas, or all.",
-            show_default="those of the job, else all of the robot",
-        ),
+        str | None, typer.Option(show_default="those of the job, else all of the robot")
     ] = None,
     controller: ControllerOption = None,
     robot: RobotOption = None,
@@ -172,6 +144,13 @@ def robustness(
 
     It is the norm of the Jacobian of the objectives' logarithms with respect to the variables as
     shares of their bounds, from a regression over designs sampled around the given one.
+
+    Args:
+        design: Design file, `-`, or published:NAME, as for `simulate`; or a job's id for its best.
+        samples: Designs to sample around each given one.
+        radius: Radius of the sample, as a share of each variable's bounds.
+        seed: Seed of the sample.
+        scenarios: Names, numbers or FILE.json, separated by commas, or all.
     """
     from gaitswarm.cli.inputs import given_design, robot_defaults
     from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest
@@ -238,23 +217,18 @@ def _robustness(view: RobustnessView) -> Parts:
 
 @dataclass(frozen=True, slots=True)
 class FolderOptions:
-    """A design, and the folder to which it is written."""
+    """A design, and the folder to which it is written.
 
-    design: Annotated[
-        str,
-        typer.Argument(
-            metavar="DESIGN|ID",
-            help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
-        ),
-    ]
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="New folder.")]
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
-            " else all]."
-        ),
-    ] = None
+    Args:
+        design: published:NAME, a file as for `simulate`, `-`, or a job's id for its best.
+        output: New folder.
+        scenarios: Names, numbers or FILE.json, separated by commas, or all [default: the job's,
+            else all].
+    """
+
+    design: Annotated[str, typer.Argument(metavar="DESIGN|ID")]
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER")]
+    scenarios: str | None = None
     controller: ControllerOption = None
     robot: RobotOption = None
 
@@ -278,17 +252,15 @@ class FolderOptions:
 
 def firmware(
     options: FolderOptions,
-    table_bits: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ERRORxCURRENT",
-            help="Bits of a fuzzy table's indices, also for the simulations [default: 10x6].",
-        ),
-    ] = None,
+    table_bits: Annotated[str | None, typer.Option(metavar="ERRORxCURRENT")] = None,
     *,
     place: Place,
 ) -> Printed:
-    """Write a design as C for the robot's microcontrollers, with a test against simulations."""
+    """Write a design as C for the robot's microcontrollers, with a test against simulations.
+
+    Args:
+        table_bits: Bits of a fuzzy table's indices, also for the simulations [default: 10x6].
+    """
     from gaitswarm.firmware import write_firmware
 
     label, arguments = options.read(place)

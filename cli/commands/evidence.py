@@ -55,30 +55,10 @@ def evidence(
 
 
 def verify(
-    source: Annotated[
-        str,
-        typer.Argument(metavar="FILE|ID", help="File of `evidence`, or a job's id or its prefix."),
-    ],
-    replay: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Evaluations to sample and repeat, of the job and of each certificate, in"
-            " addition to the best.",
-        ),
-    ] = 20,
-    seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="Seed of the sample. [default: unpredictable]"),
-    ] = None,
-    head: Annotated[
-        str | None,
-        typer.Option(
-            metavar="DIGEST",
-            help="Digest of an iteration, noted earlier, that the history must contain.",
-        ),
-    ] = None,
+    source: Annotated[str, typer.Argument(metavar="FILE|ID")],
+    replay: Annotated[int, typer.Option(min=0, metavar="N")] = 20,
+    seed: Annotated[int | None, typer.Option(min=0)] = None,
+    head: Annotated[str | None, typer.Option(metavar="DIGEST")] = None,
     *,
     place: Place,
     as_json: Json = False,
@@ -87,6 +67,13 @@ def verify(
 
     Checking a file needs neither database nor network, and never trusts the file. For a job, the
     digests of its iterations are recomputed, and the first that differs is named.
+
+    Args:
+        source: File of `evidence`, or a job's id or its prefix.
+        replay: Evaluations to sample and repeat, of the job and of each certificate, in addition to
+            the best.
+        seed: Seed of the sample. [default: unpredictable]
+        head: Digest of an iteration, noted earlier, that the history must contain.
     """
     from gaitswarm.evidence.verify import verify as verified
 

@@ -80,54 +80,39 @@ def _submitted(job: JobView, state: str, place: str) -> Iterator[str]:
 
 
 def list_jobs(
-    state: Annotated[
-        str | None,
-        typer.Option(
-            help="Only jobs in this state: queued, running, pausing, paused, cancelled, failed or"
-            " succeeded."
-        ),
-    ] = None,
-    forks_of: Annotated[
-        str | None,
-        typer.Option(metavar="ID", callback=completed, help="Only forks of this job."),
-    ] = None,
-    search: Annotated[
-        str,
-        typer.Option(metavar="TEXT", help="Only jobs whose name, id, note or tags contain this."),
-    ] = "",
-    robot: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Only jobs of this robot; `own`: custom robots."),
-    ] = None,
-    controller: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Only jobs that tune this controller.")
-    ] = None,
-    preference: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Only jobs of this preference; `own`: custom ones."),
-    ] = None,
-    tag: Annotated[str | None, typer.Option(help="Only jobs with this tag.")] = None,
-    archived: Annotated[
-        bool | None,
-        typer.Option(
-            "--archived/--not-archived",
-            help="Only archived jobs, or only others (the default).",
-        ),
-    ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="Include archived jobs.")] = False,
-    order: Annotated[
-        str,
-        typer.Option(
-            help="created (newest first), fitness (best first), gain (greatest first), name,"
-            " state, iterations, evaluations, priority, rate (most first) or time_left."
-        ),
-    ] = "created",
-    reverse: Annotated[bool, typer.Option("--reverse", help="Reverse the order.")] = False,
-    limit: Annotated[int, typer.Option(min=1, help="Maximum number of jobs.")] = 50,
+    state: str | None = None,
+    forks_of: Annotated[str | None, typer.Option(metavar="ID", callback=completed)] = None,
+    search: Annotated[str, typer.Option(metavar="TEXT")] = "",
+    robot: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    controller: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    preference: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    tag: str | None = None,
+    archived: Annotated[bool | None, typer.Option("--archived/--not-archived")] = None,
+    everything: Annotated[bool, typer.Option("--all")] = False,
+    order: str = "created",
+    reverse: Annotated[bool, typer.Option("--reverse")] = False,
+    limit: Annotated[int, typer.Option(min=1)] = 50,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """List jobs, newest first by default."""
+    """List jobs, newest first by default.
+
+    Args:
+        state: Only jobs in this state: queued, running, pausing, paused, cancelled, failed or
+            succeeded.
+        forks_of: Only forks of this job.
+        search: Only jobs whose name, id, note or tags contain this.
+        robot: Only jobs of this robot; `own`: custom robots.
+        controller: Only jobs that tune this controller.
+        preference: Only jobs of this preference; `own`: custom ones.
+        tag: Only jobs with this tag.
+        archived: Only archived jobs, or only others (the default).
+        everything: Include archived jobs.
+        order: created (newest first), fitness (best first), gain (greatest first), name, state,
+            iterations, evaluations, priority, rate (most first) or time_left.
+        reverse: Reverse the order.
+        limit: Maximum number of jobs.
+    """
     from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
 
     if everything and archived is not None:
@@ -293,66 +278,44 @@ def _comparison(view: JobComparisonView) -> Parts:
 
 def fork(
     job_id: JobId,
-    from_iteration: Annotated[
-        int,
-        typer.Option(
-            "--from",
-            metavar="K",
-            help="First iteration of the fork itself, counted from 0 as in `history`; iterations 0"
-            " to K-1 are copied.",
-        ),
-    ],
-    preference: Annotated[
-        str | None, typer.Option(help="Weighting of objectives: A, B, C, chapter-3, or JSON.")
-    ] = None,
+    from_iteration: Annotated[int, typer.Option("--from", metavar="K")],
+    preference: str | None = None,
     constraint: ConstraintOption = None,
     no_worse_than: NoWorseThan = None,
     no_constraints: NoConstraints = False,
     scenario_weight: ScenarioWeight = None,
     scenario_aggregate: ScenarioAggregate = None,
-    optimizer: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Search method; `gaitswarm optimizers` lists all."),
-    ] = None,
-    optimizer_settings: Annotated[
-        str | None,
-        typer.Option(metavar="JSON|FILE", help="Settings of the method."),
-    ] = None,
-    particles: Annotated[
-        int | None, typer.Option(help="Maximum number of designs per iteration.")
-    ] = None,
-    scenarios: Annotated[
-        str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
-    ] = None,
+    optimizer: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    optimizer_settings: Annotated[str | None, typer.Option(metavar="JSON|FILE")] = None,
+    particles: int | None = None,
+    scenarios: str | None = None,
     robot: RobotOption = None,
-    bounds: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=LOW:HIGH", help="Search this variable within other bounds; repeatable."
-        ),
-    ] = None,
-    iterations: Annotated[
-        int | None,
-        typer.Option(help="Total budget, including copied iterations."),
-    ] = None,
-    start_count: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Start designs if the search cannot be continued. [default: 5]",
-        ),
-    ] = None,
+    bounds: Annotated[list[str] | None, typer.Option(metavar="NAME=LOW:HIGH")] = None,
+    iterations: int | None = None,
+    start_count: Annotated[int | None, typer.Option(min=1)] = None,
     name: JobName = None,
     accept_changes: AcceptChanges = False,
-    idempotency_key: Annotated[
-        str | None, typer.Option(help="Repeating a key with the same fork creates no second job.")
-    ] = None,
+    idempotency_key: str | None = None,
     priority: Priority = 0,
     notify: Notify = None,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """Queue a job that starts with iterations of another; omitted options keep its values."""
+    """Queue a job that starts with iterations of another; omitted options keep its values.
+
+    Args:
+        from_iteration: First iteration of the fork itself, counted from 0 as in `history`;
+            iterations 0 to K-1 are copied.
+        preference: Weighting of objectives: A, B, C, chapter-3, or JSON.
+        optimizer: Search method; `gaitswarm optimizers` lists all.
+        optimizer_settings: Settings of the method.
+        particles: Maximum number of designs per iteration.
+        scenarios: Names, numbers or FILE.json, separated by commas.
+        bounds: Search this variable within other bounds; repeatable.
+        iterations: Total budget, including copied iterations.
+        start_count: Start designs if the search cannot be continued. [default: 5]
+        idempotency_key: Repeating a key with the same fork creates no second job.
+    """
     from gaitswarm.cli.inputs import (
         chosen_robot,
         constraint_choice,
@@ -467,19 +430,16 @@ def keep(
 def optimize(
     options: SpecOptions,
     *,
-    resume: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ID",
-            callback=completed,
-            help="Resume this job; results equal those of an uninterrupted run to the bit.",
-        ),
-    ] = None,
+    resume: Annotated[str | None, typer.Option(metavar="ID", callback=completed)] = None,
     accept_changes: AcceptChanges = False,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
-    """Run a job in this process. Ctrl-C stops it; --resume continues it."""
+    """Run a job in this process. Ctrl-C stops it; --resume continues it.
+
+    Args:
+        resume: Resume this job; results equal those of an uninterrupted run to the bit.
+    """
     from gaitswarm.cli.embedded import Embedded, finish
     from gaitswarm.cli.inputs import build_spec
 

@@ -46,21 +46,19 @@ _HUGE: Final = 1e300
 
 @dataclass(frozen=True, slots=True)
 class WalkOptions:
-    """Options that describe a measured walk."""
+    """Options that describe a measured walk.
 
-    design: Annotated[
-        str,
-        typer.Option(
-            metavar="JSON|FILE|published:NAME|job:ID",
-            help="Design as for `simulate`, or published:A.",
-        ),
-    ]
-    scenario: Annotated[str, typer.Option(help="Name or number of the walk, or FILE.json.")]
+    Args:
+        design: Design as for `simulate`, or published:A.
+        scenario: Name or number of the walk, or FILE.json.
+        cycles: Walking cycles to simulate.
+    """
+
+    design: Annotated[str, typer.Option(metavar="JSON|FILE|published:NAME|job:ID")]
+    scenario: Annotated[str, typer.Option()]
     controller: ControllerOption = None
     trajectory: TrajectoryOption = None
-    cycles: Annotated[
-        int | None, typer.Option(min=1, max=100, help="Walking cycles to simulate.")
-    ] = None
+    cycles: Annotated[int | None, typer.Option(min=1, max=100)] = None
     robot: RobotOption = None
 
     def read(self, place: Place) -> MeasuredWalk:
@@ -157,33 +155,31 @@ def record(
 
 
 def identify(
-    recordings: Annotated[
-        list[str], typer.Argument(metavar="RECORDING...", help="Ids printed by `record`.")
-    ],
+    recordings: Annotated[list[str], typer.Argument(metavar="RECORDING...")],
     *,
-    variables: Annotated[
-        str | None,
-        typer.Option(help="Parameters to fit, separated by commas. Default: all of table 2.7."),
-    ] = None,
-    links: Annotated[
-        str, typer.Option(help="Links whose currents to compare, separated by commas.")
-    ] = "1,2,3",
+    variables: str | None = None,
+    links: str = "1,2,3",
     robot: RobotOption = None,
-    runs: Annotated[
-        int,
-        typer.Option(
-            min=1, max=32, help="Number of jobs with different seeds; one alone shows no trust."
-        ),
-    ] = 3,
-    iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 120,
-    particles: Annotated[int, typer.Option(help="Designs per iteration.")] = 48,
-    seed: Annotated[int, typer.Option(help="Seed of the first job; others follow.")] = 1,
+    runs: Annotated[int, typer.Option(min=1, max=32)] = 3,
+    iterations: int = 120,
+    particles: int = 48,
+    seed: int = 1,
     precision: Precision = None,
     name: JobName = None,
     truth: Truth = None,
     workers: WorkerOptions,
 ) -> Printed:
-    """Fit a robot's parameters to recorded walks in this process, and show which are reliable."""
+    """Fit a robot's parameters to recorded walks in this process, and show which are reliable.
+
+    Args:
+        recordings: Ids printed by `record`.
+        variables: Parameters to fit, separated by commas. Default: all of table 2.7.
+        links: Links whose currents to compare, separated by commas.
+        runs: Number of jobs with different seeds; one alone shows no trust.
+        iterations: Iterations of each job.
+        particles: Designs per iteration.
+        seed: Seed of the first job; others follow.
+    """
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs import chosen_robot
     from gaitswarm.specs import job_spec
@@ -286,18 +282,17 @@ def parameters_table(view: IdentifiabilityView, truth: Mapping[str, float]) -> T
 
 
 def recordings(
-    search: Annotated[
-        str,
-        typer.Option(
-            metavar="TEXT",
-            help="Only recordings whose id, scenario or controller contain this, in any case.",
-        ),
-    ] = "",
-    limit: Annotated[int, typer.Option(min=1, help="Maximum number of recordings.")] = 50,
+    search: Annotated[str, typer.Option(metavar="TEXT")] = "",
+    limit: Annotated[int, typer.Option(min=1)] = 50,
     *,
     jobs: Jobs,
 ) -> Printed:
-    """List recorded walks and their ids for `identify`, newest first."""
+    """List recorded walks and their ids for `identify`, newest first.
+
+    Args:
+        search: Only recordings whose id, scenario or controller contain this, in any case.
+        limit: Maximum number of recordings.
+    """
 
     def parts() -> Parts:
         rows = [
@@ -320,20 +315,17 @@ def recordings(
 def validate(
     measured: Measured,
     options: WalkOptions,
-    repeat: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FILE", help="Another measurement of the same walk, for CONF; repeatable."
-        ),
-    ] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write a report in Markdown, with pictures, to DIR."),
-    ] = None,
+    repeat: Annotated[list[Path] | None, typer.Option(metavar="FILE")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     *,
     place: Place,
 ) -> Printed:
-    """Simulate a measured walk, classify the differences by tolerance, and give a verdict."""
+    """Simulate a measured walk, classify the differences by tolerance, and give a verdict.
+
+    Args:
+        repeat: Another measurement of the same walk, for CONF; repeatable.
+        report: Write a report in Markdown, with pictures, to DIR.
+    """
     from gaitswarm.cli.validation import (
         alignment,
         battery,
@@ -384,46 +376,34 @@ LeaveOneOut = Annotated[
 
 
 def calibrate(
-    table: Annotated[
-        Path,
-        typer.Argument(
-            metavar="TARGETS.csv", help="Results of walks, in the format of docs/calibration.md."
-        ),
-    ],
+    table: Annotated[Path, typer.Argument(metavar="TARGETS.csv")],
     *,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...|JSON|FOLDER",
-            help="Robot by name, or several names as choices of the variable `robot`; a variant as"
-            " JSON; or a robot's folder.",
-        ),
-    ] = None,
-    variables: Annotated[
-        str | None,
-        typer.Option(
-            help="Variables to fit, separated by commas; NAME=LOW:HIGH sets bounds, and"
-            " NAME=A:B limits choices. Default: all parameters of the robot."
-        ),
-    ] = None,
-    fixed: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUE,...", help="Variables to fix.")
-    ] = None,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            min=1, max=32, help="Number of jobs with different seeds; one alone decides nothing."
-        ),
-    ] = 3,
-    iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 60,
-    particles: Annotated[int, typer.Option(help="Designs per iteration.")] = 48,
-    seed: Annotated[int, typer.Option(help="Seed of the first job; others follow.")] = 1,
+    robot: Annotated[str | None, typer.Option(metavar="NAME,...|JSON|FOLDER")] = None,
+    variables: str | None = None,
+    fixed: Annotated[str | None, typer.Option(metavar="NAME=VALUE,...")] = None,
+    seeds: Annotated[int, typer.Option(min=1, max=32)] = 3,
+    iterations: int = 60,
+    particles: int = 48,
+    seed: int = 1,
     precision: Precision = None,
     name: JobName = None,
     leave_one_out: LeaveOneOut = None,
     workers: WorkerOptions,
 ) -> Printed:
-    """Fit a robot and unknown conventions to a table of results, in this process."""
+    """Fit a robot and unknown conventions to a table of results, in this process.
+
+    Args:
+        table: Results of walks, in the format of docs/calibration.md.
+        robot: Robot by name, or several names as choices of the variable `robot`; a variant as
+            JSON; or a robot's folder.
+        variables: Variables to fit, separated by commas; NAME=LOW:HIGH sets bounds, and NAME=A:B
+            limits choices. Default: all parameters of the robot.
+        fixed: Variables to fix.
+        seeds: Number of jobs with different seeds; one alone decides nothing.
+        iterations: Iterations of each job.
+        particles: Designs per iteration.
+        seed: Seed of the first job; others follow.
+    """
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.targets_file import read_targets
     from gaitswarm.specs import job_spec

@@ -36,17 +36,15 @@ def front(job_id: JobId, output: Output, *, jobs: Jobs) -> None:
 
 def surface(
     output: Output,
-    design: Annotated[
-        str,
-        typer.Option(
-            metavar="JSON|FILE|published:NAME|job:ID",
-            help="Design as for `simulate`, or as published:A.",
-        ),
-    ] = "published:A",
+    design: Annotated[str, typer.Option(metavar="JSON|FILE|published:NAME|job:ID")] = "published:A",
     *,
     place: Place,
 ) -> None:
-    """Draw the quantised output of a Fuzzy-PI design over angle error and motor current."""
+    """Draw the quantised output of a Fuzzy-PI design over angle error and motor current.
+
+    Args:
+        design: Design as for `simulate`, or as published:A.
+    """
     from gaitswarm.cli.inputs import given_design
     from gaitswarm.cli.pictures import draw_surface, save
     from gaitswarm.sim.controllers import CONTROLLERS

@@ -31,91 +31,49 @@ Folder = Annotated[
 
 
 def init(
-    urdf: Annotated[
-        Path, typer.Argument(metavar="FILE", help="URDF, xacro or MJCF of a legged robot.")
-    ],
+    urdf: Annotated[Path, typer.Argument(metavar="FILE")],
     *,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FOLDER", help="New or empty folder.")
-    ],
-    name: Annotated[
-        str | None, typer.Option(help="Name of the robot [default: the URDF's, else the file's].")
-    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER")],
+    name: str | None = None,
     actuator: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="auto|dc|torque|[JOINT=]NAME",
-            help="Actuators: DC motors with gearheads, or torque-controlled; auto decides by the"
-            " URDF's torques and rates. Or a servo by name, for all joints or those with the"
-            " wildcards * and ?; repeatable, and the last match counts: mx64, mx106, xl320,"
-            " xl330, sts3215, erob80-50, erob80-100, mg996r, ds3218, mini-cheetah [default:"
-            " auto].",
-        ),
+        list[str] | None, typer.Option(metavar="auto|dc|torque|[JOINT=]NAME")
     ] = None,
-    up: Annotated[
-        str | None,
-        typer.Option(
-            metavar="AXIS",
-            help="Axis of the first link that points up: x, y, z, -x, -y, -z [default: z; refused"
-            " if inconsistent with the legs].",
-        ),
-    ] = None,
-    forward: Annotated[
-        str | None,
-        typer.Option(
-            metavar="AXIS",
-            help="Axis of the first link that points forward [default: x; a warning if inconsistent"
-            " with the legs].",
-        ),
-    ] = None,
-    meshes: Annotated[
-        bool,
-        typer.Option(
-            "--meshes/--no-meshes",
-            help="Copy the URDF's meshes, which the page shows; simulations do not need them.",
-        ),
-    ] = True,
-    package: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="[NAME=]FOLDER",
-            help="Folder of the ROS package NAME, or of packages, for package:// and $(find);"
-            " before ROS_PACKAGE_PATH; repeatable.",
-        ),
-    ] = None,
-    arg: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Argument of a xacro file; repeatable."),
-    ] = None,
-    lock: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=ANGLE",
-            help="Hold a joint at an angle [rad]; * and ? are wildcards; repeatable. Wheels, arms"
-            " and whatever belongs to no leg are held anyway.",
-        ),
-    ] = None,
-    foot: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LINK=X,Y,Z",
-            help="End of the leg with this last link, in the link's frame [m]; * and ? are"
-            " wildcards; repeatable [default: what the link's shapes suggest].",
-        ),
-    ] = None,
-    mass: Annotated[
-        float | None,
-        typer.Option(
-            min=0.001,
-            help="Mass of the robot [kg], to which all masses are scaled [default: the file's].",
-        ),
-    ] = None,
+    up: Annotated[str | None, typer.Option(metavar="AXIS")] = None,
+    forward: Annotated[str | None, typer.Option(metavar="AXIS")] = None,
+    meshes: Annotated[bool, typer.Option("--meshes/--no-meshes")] = True,
+    package: Annotated[list[str] | None, typer.Option(metavar="[NAME=]FOLDER")] = None,
+    arg: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUE")] = None,
+    lock: Annotated[list[str] | None, typer.Option(metavar="JOINT=ANGLE")] = None,
+    foot: Annotated[list[str] | None, typer.Option(metavar="LINK=X,Y,Z")] = None,
+    mass: Annotated[float | None, typer.Option(min=0.001)] = None,
 ) -> Printed:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
 
     It contains robot.toml, with a comment on every guess; robot.urdf and its meshes; and job.json,
     the defaults of this robot's jobs. Then pass --robot FOLDER to any command. xacro needs
     pip install 'gaitswarm[xacro]', MJCF 'gaitswarm[mujoco]'.
+
+    Args:
+        urdf: URDF, xacro or MJCF of a legged robot.
+        output: New or empty folder.
+        name: Name of the robot [default: the URDF's, else the file's].
+        actuator: Actuators: DC motors with gearheads, or torque-controlled; auto decides by the
+            URDF's torques and rates. Or a servo by name, for all joints or those with the wildcards
+            * and ?; repeatable, and the last match counts: mx64, mx106, xl320, xl330, sts3215,
+            erob80-50, erob80-100, mg996r, ds3218, mini-cheetah [default: auto].
+        up: Axis of the first link that points up: x, y, z, -x, -y, -z [default: z; refused if
+            inconsistent with the legs].
+        forward: Axis of the first link that points forward [default: x; a warning if inconsistent
+            with the legs].
+        meshes: Copy the URDF's meshes, which the page shows; simulations do not need them.
+        package: Folder of the ROS package NAME, or of packages, for package:// and $(find); before
+            ROS_PACKAGE_PATH; repeatable.
+        arg: Argument of a xacro file; repeatable.
+        lock: Hold a joint at an angle [rad]; * and ? are wildcards; repeatable. Wheels, arms and
+            whatever belongs to no leg are held anyway.
+        foot: End of the leg with this last link, in the link's frame [m]; * and ? are wildcards;
+            repeatable [default: what the link's shapes suggest].
+        mass: Mass of the robot [kg], to which all masses are scaled [default: the file's].
     """
     from gaitswarm.robots import init_robot
     from gaitswarm.sim.proposal.frame import AXES
@@ -267,24 +225,20 @@ def _summary(view: RobotCheckView) -> str:
 
 
 def gaits(
-    gait: Annotated[
-        str | None, typer.Argument(metavar="[GAIT]", help="Gait to draw [default: list all].")
-    ] = None,
+    gait: Annotated[str | None, typer.Argument(metavar="[GAIT]")] = None,
     *,
     robot: RobotOption = None,
-    scenario: Annotated[
-        str | None,
-        typer.Option(
-            help="Scenario that sets posture, stride and sway: name, number or FILE.json [default:"
-            " the first of the robot's folder, else normal-slow]."
-        ),
-    ] = None,
-    duty_factor: Annotated[
-        float | None,
-        typer.Option(help="Share of the cycle in support [default: the gait's usual one]."),
-    ] = None,
+    scenario: str | None = None,
+    duty_factor: float | None = None,
 ) -> Printed:
-    """List gaits: order of footfalls, supporting feet, static stability."""
+    """List gaits: order of footfalls, supporting feet, static stability.
+
+    Args:
+        gait: Gait to draw [default: list all].
+        scenario: Scenario that sets posture, stride and sway: name, number or FILE.json [default:
+            the first of the robot's folder, else normal-slow].
+        duty_factor: Share of the cycle in support [default: the gait's usual one].
+    """
     from gaitswarm.cli.gaits import planned_gaits
     from gaitswarm.cli.inputs import chosen_robot, one_scenario
 
@@ -324,25 +278,19 @@ def _plan(item: GaitView) -> str:
 def mjcf(
     *,
     robot: RobotOption = None,
-    scenario: Annotated[
-        str | None,
-        typer.Option(
-            help="Scenario that sets load, slope and first pose: name, number or FILE [default:"
-            " the first of the robot's folder, else normal-fast]."
-        ),
-    ] = None,
-    contacts: Annotated[
-        bool,
-        typer.Option(help="Include MuJoCo's contacts of the soles, fitted to ours."),
-    ] = True,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE.xml", help="Default: standard output."),
-    ] = None,
+    scenario: str | None = None,
+    contacts: bool = True,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE.xml")] = None,
 ) -> None:
     """Write a robot as an MJCF model for MuJoCo, with voltages or torques as controls.
 
     Needs pip install 'gaitswarm[mujoco]'. To view it: python -m mujoco.viewer --mjcf=FILE.xml.
+
+    Args:
+        scenario: Scenario that sets load, slope and first pose: name, number or FILE [default: the
+            first of the robot's folder, else normal-fast].
+        contacts: Include MuJoCo's contacts of the soles, fitted to ours.
+        output: Default: standard output.
     """
     from gaitswarm.cli.inputs import chosen_robot, one_scenario
     from gaitswarm.sim.mujoco.engines import check_installed

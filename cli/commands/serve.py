@@ -73,34 +73,23 @@ _SIGNAL_POLL: Final = 0.2
 
 def serve(
     *,
-    host: Annotated[
-        str | None,
-        typer.Option(help="Address to listen on. [env: GAITSWARM_API_HOST; default: 127.0.0.1]"),
-    ] = None,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=65535,
-            help="Port; 0 chooses a free one. [env: GAITSWARM_API_PORT; default: 8000]",
-        ),
-    ] = None,
-    no_runner: Annotated[
-        bool, typer.Option("--no-runner", help="Run no jobs in this process.")
-    ] = False,
+    host: str | None = None,
+    port: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
+    no_runner: Annotated[bool, typer.Option("--no-runner")] = False,
     robots: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FOLDER",
-            exists=True,
-            file_okay=False,
-            help="Folder of a robot, or of several, whose meshes the page shows to users who can"
-            " read the jobs; repeatable. [env: GAITSWARM_ROBOTS; default: none]",
-        ),
+        list[Path] | None, typer.Option(metavar="FOLDER", exists=True, file_okay=False)
     ] = None,
     options: RunnerOptions,
 ) -> None:
-    """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
+    """Serve the page and the REST API, and run queued jobs, until Ctrl-C.
+
+    Args:
+        host: Address to listen on. [env: GAITSWARM_API_HOST; default: 127.0.0.1]
+        port: Port; 0 chooses a free one. [env: GAITSWARM_API_PORT; default: 8000]
+        no_runner: Run no jobs in this process.
+        robots: Folder of a robot, or of several, whose meshes the page shows to users who can read
+            the jobs; repeatable. [env: GAITSWARM_ROBOTS; default: none]
+    """
     from gaitswarm.api.app import ApiServer, create_app
     from gaitswarm.api.page import is_built
     from gaitswarm.services.monitoring.activity import Activity

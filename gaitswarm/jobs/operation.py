@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar, cast,
 from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.fields import FieldInfo
 
+from gaitswarm.docstrings import Docstring, docstring_of
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Quota
@@ -82,36 +83,6 @@ class Context:
     check_priority: Callable[[int], None] = lambda _: None  # raises Forbidden
     activity: Activity | None = None
     robots: Sequence[Path] = ()  # folders in which to look for meshes
-
-
-@dataclass(frozen=True)
-class Docstring:
-    """The parts of a docstring: text, arguments, result, and errors by class name."""
-
-    text: str
-    arguments: Mapping[str, str]
-    result: str
-    errors: Mapping[str, str]
-
-
-_SECTION: Final = re.compile(r"\n\n?(Args|Returns|Raises):\n")
-_ENTRY: Final = re.compile(r"^    \*{0,2}(\w+): (.*(?:\n {5,}.*)*)", re.MULTILINE)
-
-
-def docstring_of(function: Callable[..., Any]) -> Docstring:
-    """Split a docstring into its sections."""
-    text, *parts = _SECTION.split(inspect.getdoc(function) or "")
-    sections = dict(zip(parts[::2], parts[1::2], strict=True))
-    entries = {
-        name: {key: " ".join(entry.split()) for key, entry in _ENTRY.findall(section)}
-        for name, section in sections.items()
-    }
-    return Docstring(
-        text.strip(),
-        entries.get("Args", {}),
-        " ".join(sections.get("Returns", "").split()),
-        entries.get("Raises", {}),
-    )
 
 
 def _types() -> ModuleType:

@@ -331,13 +331,8 @@ def draw_battery(pair: Synchronised) -> Figure:
     for log, colour, label in _both(pair):
         axes.plot(time, log.current.sum(axis=1), color=colour, lw=1.0, label=f"motors, {label}")
         if log.battery_current is not None:
-            of_battery: dict[str, Any] = {
-                "color": colour,
-                "lw": 1.0,
-                "ls": ":",
-                "label": f"battery, {label}",
-            }
-            axes.plot(time, log.battery_current[:, 0], **of_battery)
+            battery, name = log.battery_current[:, 0], f"battery, {label}"
+            axes.plot(time, battery, color=colour, lw=1.0, ls=":", label=name)
     axes.set_xlabel("time since the first row compared  [s]")
     axes.set_ylabel("current  [A]")
     axes.set_xlim(time[0], time[-1])

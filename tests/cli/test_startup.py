@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
-from typer import Context
+from typer import Context, Option, Typer
+from typer.main import get_command
 
 from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.cli.main import commands
+from gaitswarm.cli.options import expanded
 from tests.cli.conftest import Finished, Gaitswarm, finish
 from tests.examples.processes import COMMAND_LINE, loaded_by, output, start_python
 
@@ -69,6 +72,46 @@ def test_a_command_built_alone_equals_the_one_among_all() -> None:
         assert _help(alone, name, alone.commands[name]) == _help(every, name, command)
     mistaken: Any = commands("fly")
     assert list(mistaken.commands) == list(every.commands)
+
+
+def test_every_option_and_argument_has_a_help_text() -> None:
+    every: Any = commands()
+    groups = [every, *(c for c in every.commands.values() if hasattr(c, "commands"))]
+    for command in (c for group in groups for c in group.commands.values()):
+        missing = [parameter.name for parameter in command.params if not parameter.help]
+        assert not missing, (command.name, missing)
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Options of a group.
+
+    Args:
+        count: How many.
+    """
+
+    count: Annotated[int, Option(min=1)] = 2
+
+
+def test_help_texts_are_those_of_docstrings() -> None:
+    def walk(robot: str, *, speed: float = 1.0, groups: Groups) -> None:
+        """Walk.
+
+        Args:
+            robot: Which one.
+            speed: How fast, in
+                lengths per second.
+        """
+
+    app = Typer(add_completion=False)
+    app.command()(expanded(walk))
+    command: Any = get_command(app)
+    assert command.help == "Walk."
+    assert {parameter.name: parameter.help for parameter in command.params} == {
+        "robot": "Which one.",
+        "speed": "How fast, in lengths per second.",
+        "count": "How many.",
+    }
 
 
 def _help(root: Any, name: str, command: Any) -> str:

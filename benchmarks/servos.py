@@ -25,7 +25,7 @@ import numpy as np
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.base import ControlLaw, JointPd
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.robot.library import listed_actuator
+from gaitswarm.sim.robot.description import listed_actuator
 from tests.examples.pendulum import SECONDS, TRAJECTORIES, Pendulum, bench, swing, times
 
 STEP: Final = 5e-4

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gaitswarm.cli.options import Place, full_id, name_and_value
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.sim.catalogue import GAIT_VARIABLES
 from gaitswarm.sim.controllers import CONTROLLERS, Controller, ControllerName
-from gaitswarm.sim.gait_variables import GAIT_VARIABLES
 from gaitswarm.sim.input import unique_names
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.robot import DEFAULT_ROBOT

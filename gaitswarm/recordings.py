@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification import RecordedWalk, record
-from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_files import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredWalk, Quantity, synchronise
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario

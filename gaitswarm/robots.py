@@ -29,8 +29,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_apart, walking_proposal
 from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.formats import as_urdf
-from gaitswarm.sim.proposal.frame import Axis, Frame
-from gaitswarm.sim.proposal.legs import LegHints, reach_below
+from gaitswarm.sim.proposal.legs import Axis, Frame, LegHints, reach_below
 from gaitswarm.sim.proposal.stance import walk_of_robot
 from gaitswarm.sim.robot import RobotFiles, load_robot
 from gaitswarm.sim.robot.bounds import (

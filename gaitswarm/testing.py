@@ -26,10 +26,9 @@ from gaitswarm.services.optimizer.search.space import Axis, Space
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case, LongCase, Walk, run_together
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
-from gaitswarm.sim.catalogue import check_design
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, check_design, with_gait
 from gaitswarm.sim.controllers import CONTROLLERS, Controller, names_of
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.walk import check_gains
 from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import MeasuredLogError
-from gaitswarm.sim.measurement.measured_csv import TIME, heading
+from gaitswarm.sim.measurement.measured_files import TIME, heading
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
 
 Floats = NDArray[np.float64]

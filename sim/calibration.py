@@ -12,11 +12,16 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
-from gaitswarm.sim.catalogue import check_design, design_catalogue, design_numbers
+from gaitswarm.sim.catalogue import (
+    GAIT_CATALOGUE,
+    check_design,
+    design_catalogue,
+    design_numbers,
+    with_gait,
+)
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, control_law
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input import Data, check_distinct
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.walk import Walking, WalkRequest, WalkSetup, walk_together

@@ -114,6 +114,12 @@ class SimulatedCase(ABC):
 
     __slots__ = ()
 
+    robot: RobotSource
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        return (self.robot,)
+
     @property
     def objectives(self) -> tuple[Objective, ...]:
         return OBJECTIVES
@@ -180,10 +186,6 @@ class Walk(SimulatedCase):
     @property
     def name(self) -> str:
         return self.scenario.name
-
-    @property
-    def robots(self) -> tuple[RobotSource, ...]:
-        return (self.robot,)
 
     @property
     def duration(self) -> float:

@@ -13,11 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, names_of
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.dynamics.electrical import supply_voltage

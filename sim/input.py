@@ -183,12 +183,23 @@ def _number(value: object) -> object:
     return f"{value:g}" if isinstance(value, float) else value
 
 
+def description_of(model: Any, location: Sequence[str | int]) -> str | None:
+    """Return the description of the field at a location in a model's document, if it has one."""
+    name = str(location[-1]) if location else ""
+    fields = (node.model_fields.get(name) for node in _containing(model, location))
+    return next((field.description for field in fields if field is not None), None)
+
+
 def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:
     """Fields, with annotations, of the models that contain the last part of a location."""
+    return {name: kind for node in _containing(model, location) for name, kind in _fields(node)}
+
+
+def _containing(model: Any, location: Sequence[str | int]) -> list[type[BaseModel]]:
     reached = [model]
     for part in location[:-1]:
         reached = [inner for one in reached for inner in _inner(one, part)]
-    return {name: kind for node in reached for name, kind in _fields(node)}
+    return [one for node in reached for _, one in _alternatives(node) if _is_model(one)]
 
 
 def _inner_keys(known: Mapping[str, Any]) -> dict[str, str]:

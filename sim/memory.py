@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import mmap
 import sys
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _NEEDED: Final = 192 << 20
 """Address space [B] to load SciPy and its OpenBLAS; with less than half of it, OpenBLAS hangs."""
@@ -25,3 +28,11 @@ def require_room_for_scipy() -> None:
             " raise the limit (ulimit -v), or free memory"
         ) from error
     room.close()
+
+
+def rotations() -> type[Rotation]:
+    """Import SciPy's rotations, which is slow and seldom needed."""
+    require_room_for_scipy()
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+    return Rotation

@@ -19,6 +19,9 @@ _ROOT: Final = Path(__file__).parent
 
 _SUFFIXES: Final = (".py", ".c", ".h")
 
+_TABLES: Final = (_ROOT / "presets.toml", _ROOT / "variables.toml")
+"""Data of the simulator; descriptions of robots have digests of their own."""
+
 _NOT_IN_A_CASE: Final = (
     "measurement",
     "proposal",
@@ -127,7 +130,7 @@ def simulator_files() -> tuple[Path, ...]:
         sorted(
             file
             for file in _ROOT.rglob("*")
-            if (file.suffix in _SUFFIXES or file.name == "variables.toml")
+            if (file.suffix in _SUFFIXES or file in _TABLES)
             and not {file, *file.parents} & set(left_out)
         )
     )

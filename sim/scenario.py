@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
+from importlib import resources
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
@@ -313,62 +315,15 @@ def _bounds_of(field: str) -> TypeAdapter[float]:
     return TypeAdapter(Annotated[float, Scenario.model_fields[field]])
 
 
-SCENARIOS: Final[tuple[Scenario, ...]] = (
-    Scenario(name="normal-fast", cycle_time=1.5, radius=0.16, hip_height=0.15),
-    Scenario(name="normal-slow", cycle_time=2.2, radius=0.16, hip_height=0.15),
-    Scenario(name="loaded-fast", cycle_time=1.5, radius=0.145, hip_height=0.20, load=2.0),
-    Scenario(name="loaded-slow", cycle_time=2.2, radius=0.145, hip_height=0.20, load=2.0),
-    Scenario(name="slope-fast", cycle_time=1.5, radius=0.20, hip_height=0.14, slope=10.0),
-    Scenario(name="turn-right-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, turn=0.5),
+_PRESETS: Final = tomllib.loads(
+    (resources.files("gaitswarm.sim") / "presets.toml").read_text(encoding="utf-8")
 )
+
+PRESETS: Final = tuple(map(Scenario.model_validate, _PRESETS["scenario"]))
+"""All named scenarios; their position from 1 is their number."""
+
+SCENARIOS: Final = PRESETS[:6]
 """The six scenarios of table 4.2 in its order, the default of jobs."""
-
-_BACKWARD: Final = Scenario(
-    name="backward", cycle_time=1.5, radius=0.16, hip_height=0.15, direction="backward"
-)
-
-HELD_OUT: Final[tuple[Scenario, ...]] = (
-    Scenario(name="turn-left-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, turn=-0.5),
-    Scenario(name="half-loaded-fast", cycle_time=1.5, radius=0.145, hip_height=0.20, load=1.0),
-    Scenario(name="overloaded-fast", cycle_time=1.5, radius=0.145, hip_height=0.20, load=3.0),
-    Scenario(name="downhill-fast", cycle_time=1.5, radius=0.20, hip_height=0.14, slope=-10.0),
-    Scenario(
-        name="slope-left-fast",
-        cycle_time=1.5,
-        radius=0.20,
-        hip_height=0.14,
-        slope=10.0,
-        slope_direction=90.0,
-    ),
-    Scenario(
-        name="slope-right-fast",
-        cycle_time=1.5,
-        radius=0.20,
-        hip_height=0.14,
-        slope=10.0,
-        slope_direction=-90.0,
-    ),
-    _BACKWARD,
-    Scenario(name="shove-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, shove=6.0),
-)
-"""Scenarios for which no design of the thesis was optimized: they show whether a design is good
-only in its own scenarios."""
-
-PRESETS: Final[tuple[Scenario, ...]] = (
-    *SCENARIOS,
-    Scenario(name="straight", cycle_time=1.5, radius=0.16, hip_height=0.15),
-    _BACKWARD,
-    Scenario(name="drop", cycle_time=1.5, radius=0.16, hip_height=0.15, drop=0.03),
-    Scenario(
-        name="stuck-leg", cycle_time=1.5, radius=0.16, hip_height=0.15, stuck_leg="right_middle"
-    ),
-    *(scenario for scenario in HELD_OUT if scenario is not _BACKWARD),
-)
-"""All named scenarios; their position from 1 is their number.
-
-`straight` is the walk of chapter 3 (section 3.1), whose designs set their own gait, and
-`backward` that of figs. 2.7 and 2.8; `drop` and `stuck-leg` are the protection's cases (4.3.2).
-"""
 
 
 def find_scenario(name: str | Scenario) -> Scenario:
@@ -381,6 +336,11 @@ def find_scenario(name: str | Scenario) -> Scenario:
     names = [scenario.name for scenario in PRESETS]
     listed = (f"{k} {known}" for k, known in enumerate(names, start=1))
     raise SimulationInputError(f"unknown scenario {name!r}; {instead_of(name, names, listed)}")
+
+
+HELD_OUT: Final = tuple(map(find_scenario, _PRESETS["held_out"]))
+"""Scenarios for which no design of the thesis was optimized: they show whether a design is good
+only in its own scenarios."""
 
 
 def _preset_exists(name: str) -> str:

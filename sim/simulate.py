@@ -20,13 +20,13 @@ from gaitswarm.sim.assembly import (
     measure,
     plan_walk,
 )
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.compiler.compilation import target
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, control_law, names_of
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.gaits import LegGait, leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.walk import (

@@ -13,9 +13,10 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-Floats = NDArray[np.float64]
+from gaitswarm.sim.arrays import Floats
+from gaitswarm.sim.input import Data
 
 _EDGE: Final = 0.005
 """Largest width of the ramp that represents a vertical edge [m]."""
@@ -33,17 +34,13 @@ _LARGEST_GRID: Final = 40_000
 """Limit of the heights in a document."""
 
 
-class _Kind(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Plane(_Kind):
+class Plane(Data):
     """Flat ground, level or on the scenario's slope."""
 
     kind: Literal["plane"] = "plane"
 
 
-class _Edges(_Kind):
+class _Edges(Data):
     height: float = Field(gt=0.0, le=0.5, description="Height of a step [m].", examples=[0.02])
     depth: float = Field(
         default=0.25, ge=0.02, le=5.0, description="Length of a step along the walk [m]."
@@ -68,7 +65,7 @@ class Stairs(_Edges):
     kind: Literal["stairs"]
 
 
-class Rough(_Kind):
+class Rough(Data):
     """Smooth random bumps that repeat after 64 correlation lengths."""
 
     kind: Literal["rough"]
@@ -87,7 +84,7 @@ class Rough(_Kind):
     seed: int = Field(default=1, ge=0, lt=2**53, description="Seed of the heights.")
 
 
-class Grid(_Kind):
+class Grid(Data):
     """Measured heights; beyond the grid, the heights of its edge go on."""
 
     kind: Literal["grid"]

@@ -105,8 +105,7 @@ def read_measured(path: Path, robot: Robot) -> MeasuredLog:
     """Read a log; errors name file, line or row, column and unit."""
     from gaitswarm.cli.inputs import read_file
     from gaitswarm.sim.errors import MeasuredLogError
-    from gaitswarm.sim.measurement.measured_binary import parse_mcap, parse_npz
-    from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+    from gaitswarm.sim.measurement.measured_files import parse_mcap, parse_measured_log, parse_npz
 
     content = read_file(path, "measured", LARGEST_FILE)
     parsed = {".npz": parse_npz, ".mcap": parse_mcap}.get(path.suffix.lower())

@@ -76,7 +76,7 @@ def init(
         mass: Mass of the robot [kg], to which all masses are scaled [default: the file's].
     """
     from gaitswarm.robots import init_robot
-    from gaitswarm.sim.proposal.frame import AXES
+    from gaitswarm.sim.proposal.legs import AXES
 
     kind, actuators = _actuators(actuator or [])
     created = init_robot(
@@ -117,7 +117,7 @@ def _actuators(entries: list[str]) -> tuple[ActuatorChoice, dict[str, str]]:
     """Split the option into a kind and names by joint."""
     from gaitswarm.sim.near_names import instead_of
     from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
-    from gaitswarm.sim.robot.library import listed_actuators
+    from gaitswarm.sim.robot.description import listed_actuators
 
     for choice in ACTUATOR_CHOICES:
         if entries in ([], [choice]):

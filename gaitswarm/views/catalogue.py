@@ -15,9 +15,8 @@ from gaitswarm.services.optimizer.search.registry import (
 )
 from gaitswarm.services.optimizer.views import View, fields_of, listing_name
 from gaitswarm.sim.case_registry import CASES
-from gaitswarm.sim.catalogue import design_shown
+from gaitswarm.sim.catalogue import GAIT_VARIABLES, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.gait_variables import GAIT_VARIABLES
 from gaitswarm.sim.plugins import Kind, Registry
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
 from gaitswarm.sim.robot.identifiable import CONVENTIONAL_VARIABLES, identifiable_variables

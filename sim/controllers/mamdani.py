@@ -15,12 +15,11 @@ from functools import lru_cache, reduce
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gaitswarm.sim.arrays import Floats
 
 N_POINTS: Final = 101
 """Samples of the output universe."""
-
-Floats = NDArray[np.float64]
 
 
 class Shape(IntEnum):

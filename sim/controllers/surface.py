@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.base import Inference, Universe
 from gaitswarm.sim.controllers.mamdani import FuzzySet
 from gaitswarm.sim.controllers.quantisation import OUTPUT_BITS, Axis, table_bytes
-
-Floats = NDArray[np.float64]
 
 SURFACE_AXES: Final = ("error", "current")
 """Inputs of a surface; others are held constant."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.assembly import control_steps, judge, kernel_of, plan_walk
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName, control_law
 from gaitswarm.sim.controllers.base import LookupTable
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
@@ -30,7 +31,6 @@ from gaitswarm.sim.firmware.microcontroller import (
     trajectory_table,
 )
 from gaitswarm.sim.gait.trajectory import require_reachable
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.emitted.source import control_tick
 from gaitswarm.sim.kernel.observation import encoder_angles, split_states
 from gaitswarm.sim.kernel.walk import Coding, WalkResult, WalkSetup

@@ -10,9 +10,9 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 
 from gaitswarm.sim.arrays import Floats
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.observation import WalkLog, sensed_currents
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.memory import require_room_for_scipy

@@ -30,21 +30,19 @@ from gaitswarm.sim.proposal.drive import (
     weak_actuators,
 )
 from gaitswarm.sim.proposal.formats import as_urdf
-from gaitswarm.sim.proposal.frame import (
+from gaitswarm.sim.proposal.legs import (
     AS_IT_IS,
+    NO_HINTS,
+    FoundLeg,
+    FoundLegs,
     Frame,
+    LegHints,
+    chain_leg,
+    find_legs,
     fixed_joint,
     sideways,
     turned,
     with_elements,
-)
-from gaitswarm.sim.proposal.legs import (
-    NO_HINTS,
-    FoundLeg,
-    FoundLegs,
-    LegHints,
-    chain_leg,
-    find_legs,
 )
 from gaitswarm.sim.proposal.stance import (
     HEIGHTS,

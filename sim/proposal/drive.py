@@ -16,9 +16,13 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.kernel.parameters import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
-from gaitswarm.sim.robot.description import ActuatorKind, DryFriction
+from gaitswarm.sim.robot.description import (
+    ActuatorKind,
+    DryFriction,
+    ListedActuator,
+    listed_actuator,
+)
 from gaitswarm.sim.robot.legs import ChainLeg
-from gaitswarm.sim.robot.library import ListedActuator, listed_actuator
 from gaitswarm.sim.robot.urdf import Joint, Urdf
 
 _ENOUGH, _PLAUSIBLE = 2.0, 60.0

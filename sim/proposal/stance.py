@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import BeyondJointLimit, RobotFileError, UnreachablePose
 from gaitswarm.sim.gait.gaits import GAITS, lags_of
 from gaitswarm.sim.gait.inverse_kinematics import chain_angles
@@ -21,8 +21,6 @@ from gaitswarm.sim.proposal.legs import tried_angles
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 HEIGHTS: Final = (0.75, 0.7, 0.8, 0.65, 0.85, 0.6, 0.9)
 """Heights of the hips in a stance, relative to stretched legs, in the order of trial."""

@@ -11,11 +11,11 @@ from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
-from gaitswarm.sim.input import message_of, with_known_keys
+from gaitswarm.sim.input import description_of, message_of, with_known_keys
 from gaitswarm.sim.robot.bounds import check_toml, shortened
 from gaitswarm.sim.robot.description import (
     DIRECTIONAL_FRICTION,
@@ -23,16 +23,9 @@ from gaitswarm.sim.robot.description import (
     Actuator,
     Contact,
     DryFriction,
-    Gearhead,
     Leg,
-    Motor,
-    PositionLoop,
-    Pwm,
     RobotDescription,
-    Sensors,
-    Supply,
     TorqueActuator,
-    TorqueCommand,
 )
 from gaitswarm.sim.robot.legs import (
     ChainLeg,
@@ -51,21 +44,6 @@ _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
 _FIELD: Final = re.compile(r"`(\w+)`")
 """Field of a leg in a message."""
 
-_PARTS: Final[tuple[type[BaseModel], ...]] = (
-    RobotDescription,
-    Motor,
-    Gearhead,
-    Actuator,
-    PositionLoop,
-    TorqueActuator,
-    TorqueCommand,
-    Supply,
-    Pwm,
-    Sensors,
-    Contact,
-    Leg,
-)
-
 
 def first_problem(error: ValidationError, text: str) -> str:
     first = with_known_keys(error.errors(), RobotDescription)[0]
@@ -73,7 +51,7 @@ def first_problem(error: ValidationError, text: str) -> str:
     where = shortened(".".join(str(part) for part in location))
     line = line_of(text, [part for part in location if not _is_class(part)])
     message = message_of(first)
-    meaning = _meaning(first["loc"])
+    meaning = description_of(RobotDescription, first["loc"])
     return (
         "robot.toml"
         + (f", line {line}" if line else "")
@@ -130,16 +108,6 @@ def _without_kind(location: tuple[str | int, ...]) -> tuple[str | int, ...]:
 def _is_class(part: str | int) -> bool:
     """Recognize members of unions, which pydantic adds to locations."""
     return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
-
-
-def _meaning(location: tuple[str | int, ...]) -> str | None:
-    own = (TorqueActuator,) if "torque" in location[2:3] else ()
-    field = str(location[-1]) if location else ""
-    parts: tuple[type[BaseModel], ...] = (*own, *_PARTS)
-    for part in parts:
-        if field in part.model_fields:
-            return part.model_fields[field].description
-    return None
 
 
 _DEGREES: Final = "; it seems to be in degrees: 45 degrees are 0.7854 rad"

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.memory import require_room_for_scipy
+from gaitswarm.sim.memory import rotations
 from gaitswarm.sim.robot.description import Leg
 from gaitswarm.sim.robot.legs import LegKinematics, chain_of
 from gaitswarm.sim.robot.robot import Robot
@@ -178,14 +178,10 @@ def _half_extent(kind: SolidKind, size: Floats) -> Floats:
 
 
 def _capsule(end: Floats, radius: float, role: Role) -> Shape:
-    # Slow to import, and only needed for display.
-    require_room_for_scipy()
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415
-
     length = float(np.linalg.norm(end))
     turn = _UPRIGHT
     if length > 0.0:
-        turn = Rotation.align_vectors(end / length, np.array([0.0, 0.0, 1.0]))[0].as_quat()
+        turn = rotations().align_vectors(end / length, np.array([0.0, 0.0, 1.0]))[0].as_quat()
     return _shape("capsule", np.array([radius, length]), 0.5 * end, turn, role)
 
 

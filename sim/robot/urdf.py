@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Literal, cast
+from typing import Final, Literal, cast
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
@@ -17,11 +17,8 @@ import numpy as np
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.memory import require_room_for_scipy
+from gaitswarm.sim.memory import rotations
 from gaitswarm.sim.robot.bounds import LARGEST, check_urdf, shortened
-
-if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,18 +146,12 @@ class Origin:
 
     def matrix(self) -> Floats:
         """Rotation matrix to the other frame, (3, 3); exact without rotation."""
-        return self._rotation().as_matrix() if self.rpy.any() else np.eye(3)
+        turns = bool(self.rpy.any())
+        return rotations().from_euler("xyz", self.rpy).as_matrix() if turns else np.eye(3)
 
     def quaternion(self) -> Floats:
         """Rotation to the other frame as quaternion x y z w, (4,)."""
-        return self._rotation().as_quat()
-
-    def _rotation(self) -> Rotation:
-        # Slow to import, and seldom needed.
-        require_room_for_scipy()
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415
-
-        return Rotation.from_euler("xyz", self.rpy)
+        return rotations().from_euler("xyz", self.rpy).as_quat()
 
 
 def origin_of(element: ET.Element, whose: str) -> Origin:
@@ -329,11 +320,8 @@ def _hold(element: ET.Element, kind: str, angle: float) -> None:
             " at 0"
         )
     if angle and kind != "fixed":
-        require_room_for_scipy()
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415
-
-        turned = Rotation.from_matrix(joint.origin.matrix())
-        turned = turned * Rotation.from_rotvec(angle * joint.axis)
+        turned = rotations().from_matrix(joint.origin.matrix())
+        turned = turned * rotations().from_rotvec(angle * joint.axis)
         xyz, rpy = joint.origin.xyz.tolist(), turned.as_euler("xyz").tolist()
         for origin in element.findall("origin"):
             element.remove(origin)

@@ -10,11 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, listed_limits, listed_variables
-
-Floats = NDArray[np.float64]
 
 PERTURBATIONS: Final = listed_variables("world")
 """Quantities that a world may vary; `default` is the nominal value."""

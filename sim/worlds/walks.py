@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.case import MeasuredCase, SimulatedCase
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.controllers import ControllerName, control_law
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.parameters import Layout, gravity_on
 from gaitswarm.sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
@@ -29,8 +30,6 @@ from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, plan_of_scenario, walking
 from gaitswarm.sim.terrain import HeightGrid, Plane, Rough, height_grid, rough_grid
 from gaitswarm.sim.worlds.perturbations import NOMINAL, check_worlds
-
-Floats = NDArray[np.float64]
 
 _SCALED: Final[Mapping[str, tuple[str, ...]]] = {
     "friction_factor": ("friction",),
@@ -226,8 +225,31 @@ def _sensor_errors(values: Mapping[str, Floats]) -> list[SensorErrors]:
     ]
 
 
+class _WalkInWorlds(SimulatedCase):
+    """Cases that set up their simulations in worlds."""
+
+    __slots__ = ()
+
+    precision: Precision
+
+    @abstractmethod
+    def _setups(self, robot: Robot, designs: Floats) -> Mapping[int, WalkSetup]:
+        """Return setups by index of the design, without gaits out of the legs' reach."""
+
+    def _simulating(
+        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
+    ) -> Walking[Simulation]:
+        robot = load_robot(self.robot)
+        setups, precision = self._setups(robot, designs), self.precision
+        return (
+            yield from walking(
+                robot, setups, len(designs), kernel=kernel, precision=precision, log=log
+            )
+        )
+
+
 @dataclass(frozen=True, slots=True)
-class PerturbedWalk(SimulatedCase):
+class PerturbedWalk(_WalkInWorlds):
     """Designs of a controller in a scenario of one world, unknown to the controller."""
 
     name: str  # unique in its job
@@ -240,26 +262,10 @@ class PerturbedWalk(SimulatedCase):
     precision: Precision = "double"
 
     @property
-    def robots(self) -> tuple[RobotSource, ...]:
-        return (self.robot,)
-
-    @property
     def duration(self) -> float:
         return self.scenario.duration
 
-    def _simulating(
-        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
-    ) -> Walking[Simulation]:
-        robot = load_robot(self.robot)
-        setups = self._setups(robot, designs)
-        return (
-            yield from walking(
-                robot, setups, len(designs), kernel=kernel, precision=self.precision, log=log
-            )
-        )
-
-    def _setups(self, robot: Robot, designs: Floats) -> dict[int, WalkSetup]:
-        """Setups by index of the design, without gaits out of the legs' reach."""
+    def _setups(self, robot: Robot, designs: Floats) -> Mapping[int, WalkSetup]:
         _, timestep = control_steps(robot)
         of_gait: dict[tuple[float, ...], WalkSetup | None] = {}
         laws = []
@@ -290,7 +296,7 @@ class MeasuredPerturbedWalk(MeasuredCase, PerturbedWalk):
 
 
 @dataclass(frozen=True, slots=True)
-class WorldWalk(SimulatedCase):
+class WorldWalk(_WalkInWorlds):
     """One design in one scenario; the world varies.
 
     Desired angles and control law are those of the robot as described: the controller does not know
@@ -310,29 +316,13 @@ class WorldWalk(SimulatedCase):
         return self.scenario.name
 
     @property
-    def robots(self) -> tuple[RobotSource, ...]:
-        return (self.robot,)
-
-    @property
     def duration(self) -> float:
         """Simulated time of one world [s], with the design's cycle time if it has one."""
         cycle_time = dict(self.design).get("cycle_time", self.scenario.cycle_time)
         return self.scenario.cycles * cycle_time
 
-    def _simulating(
-        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
-    ) -> Walking[Simulation]:
+    def _setups(self, robot: Robot, designs: Floats) -> Mapping[int, WalkSetup]:
         check_worlds(self.variables, designs)
-        robot = load_robot(self.robot)
-        setups = dict(enumerate(self._setups(robot, designs)))
-        return (
-            yield from walking(
-                robot, setups, len(designs), kernel=kernel, precision=self.precision, log=log
-            )
-        )
-
-    def _setups(self, robot: Robot, worlds: Floats) -> list[WalkSetup]:
-        """One setup per world; none for a gait out of the legs' reach."""
         gait = {name: value for name, value in self.design if name in GAIT_CATALOGUE}
         gains = tuple((n, value) for n, value in self.design if n not in GAIT_CATALOGUE)
         scenario = with_gait(self.scenario, gait)
@@ -340,9 +330,10 @@ class WorldWalk(SimulatedCase):
         _, timestep = control_steps(robot)
         plan = plan_walk(robot, scenario, timestep)
         if plan is None:
-            return []
-        nominal = [plan(law)] * len(worlds)
-        return perturbed_setups(robot, scenario, nominal, self.variables, worlds)
+            return {}
+        nominal = [plan(law)] * len(designs)
+        setups = perturbed_setups(robot, scenario, nominal, self.variables, designs)
+        return dict(enumerate(setups))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
+from gaitswarm.sim.catalogue import GAIT_VARIABLES
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.gait_variables import GAIT_VARIABLES
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
 from gaitswarm.sim.scenario import PRESETS, SCENARIOS
 

@@ -83,6 +83,8 @@ def test_a_scenario_out_of_its_reach_is_refused_by_leg_and_millimetres(
         ('motor = "2232SR"', 'motor = "9999"', ("actuators.coxa.motor", "9999")),
         ("voltage = 11.6", 'voltage = "high"', ("supply.voltage", "[V]")),
         ("counts = 511", "counts = = 511", ("line 39",)),
+        ("counts = 511", "counts = 0", ("line 39: pwm.counts", "(full scale [counts])")),
+        ('name = "left_rear"', 'name = "tail"', ("line 72: leg 'tail'", "no joint 'tail_coxa'")),
         ("phase = 0.75", "phase = 7.5", ("legs.1.phase", "line 64", "[1]")),
         ("phase = 0.75", f"{'.'.join('a' * 99)} = 1", ("robot.toml, line 64", "nested too deep")),
     ],

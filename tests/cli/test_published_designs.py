@@ -8,8 +8,8 @@ from gaitswarm.cli.inputs import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec, adapted_to_job, published_study
 from gaitswarm.services.optimizer.search.pso import PsoSettings
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from tests.cli.conftest import Gaitswarm, WriteJson
 
 GAIT = {"cycle_time", "stride", "height", "duty_factor", "fir_ms"}

@@ -15,7 +15,7 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size, pack_parameters
 from gaitswarm.sim.kernel.walk import WalkSetup
 from gaitswarm.sim.proposal.drive import DriveNumbers, actuator_tables
-from gaitswarm.sim.robot.library import listed_actuator
+from gaitswarm.sim.robot.description import listed_actuator
 from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.scenario import SCENARIOS
 

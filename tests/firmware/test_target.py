@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.firmware import write_firmware
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.firmware.microcontroller import BUDGET, CODE_BYTES
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from tests.examples.walks import short_walk
 from tests.firmware.conftest import TOOLS, make, published, with_changed_cell
 

@@ -12,10 +12,9 @@ import pytest
 
 from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.proposal import from_xacro
+from gaitswarm.sim.proposal import formats
 from gaitswarm.sim.proposal.document import propose_robot, walking_proposal
-from gaitswarm.sim.proposal.formats import as_urdf, format_of
-from gaitswarm.sim.proposal.from_xacro import expanded
+from gaitswarm.sim.proposal.formats import as_urdf, expanded, format_of
 from gaitswarm.sim.robot.description import ActuatorKind
 from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.urdf import parse_urdf
@@ -140,7 +139,7 @@ def test_a_missing_argument_is_named_with_the_remedy() -> None:
 def test_an_extra_that_is_not_installed_is_named(
     text: str, extra: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(from_xacro, "find_spec", lambda _: None)
+    monkeypatch.setattr(formats, "find_spec", lambda _: None)
     with pytest.raises(RobotFileError, match=rf"pip install 'gaitswarm\[{extra}\]'"):
         as_urdf(text)
 

@@ -12,8 +12,7 @@ from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import walking_proposal
 from gaitswarm.sim.proposal.legs import LegHints
-from gaitswarm.sim.robot.description import DryFriction
-from gaitswarm.sim.robot.library import listed_actuators
+from gaitswarm.sim.robot.description import DryFriction, listed_actuators
 from gaitswarm.sim.robot.robot import Robot, parse_robot
 from tests.robots.test_proposal import dog
 

@@ -12,8 +12,7 @@ from gaitswarm.cli.main import run
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal import document
 from gaitswarm.sim.proposal.document import Proposal, propose_robot, walking_proposal
-from gaitswarm.sim.proposal.frame import AS_IT_IS
-from gaitswarm.sim.proposal.legs import LegHints
+from gaitswarm.sim.proposal.legs import AS_IT_IS, LegHints
 from gaitswarm.sim.proposal.stance import HEIGHTS
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import Robot, parse_robot

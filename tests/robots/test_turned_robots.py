@@ -11,7 +11,7 @@ import pytest
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import propose_robot
-from gaitswarm.sim.proposal.frame import AXES, Axis, Frame, turned
+from gaitswarm.sim.proposal.legs import AXES, Axis, Frame, turned
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.urdf import parse_urdf

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.gait.curves import foot_curve
 from gaitswarm.sim.gait.gaits import GAITS, find_gait, lags_of, leg_gaits, supporting
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.limbs import feet_in_body
 from gaitswarm.sim.robot.robot import Robot, leg_groups, parse_robot

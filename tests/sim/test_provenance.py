@@ -48,7 +48,8 @@ def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_proces
     covered = set(simulator_files())
     uncovered = {Path(file) for file in loaded} - covered
     assert uncovered == {ROOT / "gaitswarm" / "sim" / "provenance.py"}
-    for source in ("kernel/emitted/driver.c", "controllers/estimate.c", "compiler/vec.h"):
+    code = ("kernel/emitted/driver.c", "controllers/estimate.c", "compiler/vec.h")
+    for source in (*code, "presets.toml", "variables.toml"):
         assert ROOT / "gaitswarm" / "sim" / source in covered
 
 

@@ -10,8 +10,8 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from gaitswarm.sim.catalogue import GAIT_VARIABLES, with_gait
 from gaitswarm.sim.errors import SimulationInputError, UnreachablePose
-from gaitswarm.sim.gait_variables import GAIT_VARIABLES, with_gait
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, find_scenario

@@ -22,7 +22,7 @@ from gaitswarm.sim.kernel.walk import Coding, WalkSetup
 from gaitswarm.sim.mujoco import forces
 from gaitswarm.sim.proposal.document import Proposal, walking_proposal
 from gaitswarm.sim.proposal.legs import LegHints
-from gaitswarm.sim.robot.library import listed_actuator
+from gaitswarm.sim.robot.description import listed_actuator
 from gaitswarm.sim.robot.robot import Robot, parse_robot
 from gaitswarm.sim.simulate import check_drives, simulate
 from tests.examples.pendulum import TRAJECTORIES, Pendulum, bench, swing, times

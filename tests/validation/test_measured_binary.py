@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import MeasuredLogError
-from gaitswarm.sim.measurement import measured_binary
-from gaitswarm.sim.measurement.measured_binary import parse_mcap, parse_npz
+from gaitswarm.sim.measurement import measured_files
+from gaitswarm.sim.measurement.measured_files import parse_mcap, parse_npz
 from gaitswarm.sim.measurement.measured_log import MeasuredLog
 from scripts.measured_logs import columns_of_log, format_mcap, format_npz
 from tests.validation.test_measured_csv import assert_same, small_log
@@ -78,7 +78,7 @@ def test_another_file_is_no_npz_log(content: bytes) -> None:
 
 
 def test_an_npz_file_is_not_unpacked_without_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measured_binary, "LARGEST", 1 << 16)
+    monkeypatch.setattr(measured_files, "LARGEST", 1 << 16)
     with pytest.raises(MeasuredLogError, match="MiB when unpacked"):
         parse_npz(format_npz(LOG), ROBOT)
 

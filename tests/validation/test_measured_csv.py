@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
-from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_files import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
 from gaitswarm.sim.robot.robot import Robot
 from scripts.measured_logs import format_measured_log

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_files import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import Quantity, simulated_log
 from gaitswarm.sim.validation import Tolerance
 from scripts.synthesize import (

@@ -9,7 +9,7 @@ import pytest
 
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification import CurrentFit, record
-from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_files import parse_measured_log
 from gaitswarm.sim.measurement.measured_log import (
     MeasuredLog,
     MeasuredWalk,

@@ -53,10 +53,9 @@ from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import run_together
-from gaitswarm.sim.catalogue import design_numbers
+from gaitswarm.sim.catalogue import GAIT_VARIABLES, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationError, SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_VARIABLES
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS, Outcome, Status
 

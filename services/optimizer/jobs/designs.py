@@ -13,10 +13,9 @@ from gaitswarm.services.optimizer.errors import simulation_errors
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.services.optimizer.views import Request
 from gaitswarm.sim.assembly import check_precision
-from gaitswarm.sim.catalogue import check_design, design_numbers
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, check_design, design_numbers, with_gait
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, Scenarios

@@ -33,10 +33,9 @@ from gaitswarm.sim.calibration import (
     walk_variables,
 )
 from gaitswarm.sim.case import Case
-from gaitswarm.sim.catalogue import design_shown
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, design_shown, orders_searched
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, orders_searched
 from gaitswarm.sim.identification import LINK_CURRENTS, CurrentFit, Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import RESULTS, Objective

@@ -20,10 +20,15 @@ from gaitswarm.services.optimizer.search.optimizer import CountedState, Optimize
 from gaitswarm.services.optimizer.search.registry import RandomSearchSettings
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import Case
-from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
+from gaitswarm.sim.catalogue import (
+    GAIT_CATALOGUE,
+    check_design,
+    design_numbers,
+    design_shown,
+    with_gait,
+)
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.mujoco.engines import (

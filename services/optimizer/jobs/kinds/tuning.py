@@ -46,9 +46,9 @@ from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
+from gaitswarm.sim.catalogue import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import N_OBJECTIVES, OBJECTIVES, RESULTS, Objective
 from gaitswarm.sim.plugins import PluginSettings

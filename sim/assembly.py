@@ -9,8 +9,8 @@ from functools import partial
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.compiler.compilation import find_compiler, without_compiler
 from gaitswarm.sim.controllers import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
@@ -181,7 +181,7 @@ def plan_walk(
 
 def judge(
     setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
-) -> tuple[Status, NDArray[np.float64]]:
+) -> tuple[Status, Floats]:
     """Return status and objectives f1 to f6 (table 4.1), (6,), NaN where undefined."""
     objectives = np.full(N_OBJECTIVES, np.nan)
     if result.status is not Status.OK:
@@ -197,9 +197,7 @@ def judge(
     return Status.OK, objectives
 
 
-def measure(
-    setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
-) -> NDArray[np.float64]:
+def measure(setup: WalkSetup, result: WalkResult, substeps: int, timestep: float) -> Floats:
     """Return `gaitswarm.sim.outcome.MEASUREMENTS` (10,), NaN for a walk that ended early."""
     if result.status is not Status.OK:
         return np.full(N_MEASUREMENTS, np.nan)

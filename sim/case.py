@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.kernel.walk import Kernel, KernelTime, Walking, walk_together
 from gaitswarm.sim.outcome import OBJECTIVES, RESULTS, Objective, Outcome
@@ -45,7 +45,7 @@ class Case(Protocol):
     def objectives(self) -> tuple[Objective, ...]:
         """Columns of its outcomes' objectives."""
 
-    def run(self, designs: NDArray[np.float64]) -> Outcome:
+    def run(self, designs: Floats) -> Outcome:
         """Evaluate designs.
 
         Args:
@@ -60,7 +60,7 @@ class Case(Protocol):
 class WalkingCase(Case, Protocol):
     """A case whose simulations can run together with those of other cases; `run` gives the same."""
 
-    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+    def walking(self, designs: Floats) -> Walking[Outcome]:
         """Prepare the evaluation of designs together with other cases."""
 
 
@@ -71,7 +71,7 @@ class LongCase(Case, Protocol):
     Designs share nothing, so that each may be a task of its own.
     """
 
-    def run_until(self, designs: NDArray[np.float64], should_stop: Callable[[], bool]) -> Outcome:
+    def run_until(self, designs: Floats, should_stop: Callable[[], bool]) -> Outcome:
         """Evaluate designs as `run` does, bit for bit, unless it is stopped.
 
         Args:
@@ -85,7 +85,7 @@ class LongCase(Case, Protocol):
 
 def run_together(
     cases: Sequence[Case],
-    designs: Sequence[NDArray[np.float64]],
+    designs: Sequence[Floats],
     kernel_time: KernelTime | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> tuple[Outcome, ...]:
@@ -103,7 +103,7 @@ def run_together(
     )
 
 
-def _run(case: Case, designs: NDArray[np.float64], should_stop: Callable[[], bool]) -> Outcome:
+def _run(case: Case, designs: Floats, should_stop: Callable[[], bool]) -> Outcome:
     if isinstance(case, LongCase):
         return case.run_until(designs, should_stop)
     return case.run(designs)
@@ -126,12 +126,12 @@ class SimulatedCase(ABC):
 
     @abstractmethod
     def _simulating(
-        self, designs: NDArray[np.float64], *, log: bool = False, kernel: Kernel | None = None
+        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
     ) -> Walking[Simulation]:
         """Prepare the simulation of all designs, by the robot's kernel or a given one."""
 
     def simulate(
-        self, designs: NDArray[np.float64], *, log: bool = False, kernel: Kernel | None = None
+        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
     ) -> Simulation:
         """Simulate every design, with measurements and, if requested, logs.
 
@@ -143,12 +143,12 @@ class SimulatedCase(ABC):
         (simulation,) = walk_together([self._simulating(designs, log=log, kernel=kernel)])
         return simulation
 
-    def run(self, designs: NDArray[np.float64]) -> Outcome:
+    def run(self, designs: Floats) -> Outcome:
         """Simulate every design."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
-    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+    def walking(self, designs: Floats) -> Walking[Outcome]:
         """Prepare the simulation of all designs together with other cases.
 
         Args:
@@ -167,7 +167,7 @@ class MeasuredCase(SimulatedCase):
     def objectives(self) -> tuple[Objective, ...]:
         return RESULTS
 
-    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+    def walking(self, designs: Floats) -> Walking[Outcome]:
         simulation = yield from self._simulating(designs)
         columns = [simulation.outcome.objectives, simulation.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), simulation.outcome.statuses)
@@ -191,7 +191,7 @@ class Walk(SimulatedCase):
     def duration(self) -> float:
         return self.scenario.duration
 
-    def run_with(self, kernel: Kernel, designs: NDArray[np.float64]) -> Outcome:
+    def run_with(self, kernel: Kernel, designs: Floats) -> Outcome:
         """Simulate every design with a given kernel.
 
         Args:
@@ -201,7 +201,7 @@ class Walk(SimulatedCase):
         return self.simulate(designs, kernel=kernel).outcome
 
     def _simulating(
-        self, designs: NDArray[np.float64], *, log: bool = False, kernel: Kernel | None = None
+        self, designs: Floats, *, log: bool = False, kernel: Kernel | None = None
     ) -> Walking[Simulation]:
         return simulating(
             self.scenario,

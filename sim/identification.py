@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from gaitswarm.sim.arrays import Floats
@@ -123,7 +122,7 @@ class RecordedWalk(BaseModel):
         check_reach(self.scenario, tuple(self.design), tuple(self.design.values()), robot=robot)
 
     @cached_property
-    def amperes(self) -> NDArray[np.float64]:
+    def amperes(self) -> Floats:
         """`current` as an array (T, J) [A], read-only."""
         array = np.array(self.current, dtype=np.float64)
         array.flags.writeable = False

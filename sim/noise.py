@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import Data
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
@@ -41,7 +41,7 @@ class LinkNoise(Data):
             )
         return self
 
-    def samples(self, ticks: int, joints: int) -> NDArray[np.float64]:
+    def samples(self, ticks: int, joints: int) -> Floats:
         """Return noise (ticks, joints) [N m] or [rad]; a longer walk begins with the same noise.
 
         Args:

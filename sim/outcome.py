@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
 
 
@@ -126,7 +127,7 @@ class Outcome:
         statuses: (n,) uint8, values of `Status`.
     """
 
-    objectives: NDArray[np.float64]
+    objectives: Floats
     statuses: NDArray[np.uint8]
 
     def __post_init__(self) -> None:
@@ -142,22 +143,22 @@ class Outcome:
 class Measurements:
     """Measurements of n designs, each (n,), NaN where a walk ended early; see `MEASUREMENTS`."""
 
-    peak_current: NDArray[np.float64]
-    mean_current: NDArray[np.float64]
-    motor_heat: NDArray[np.float64]
-    power: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    peak_torque: NDArray[np.float64]
-    roll: NDArray[np.float64]
-    pitch: NDArray[np.float64]
-    foot_clearance: NDArray[np.float64]
-    slip: NDArray[np.float64]
+    peak_current: Floats
+    mean_current: Floats
+    motor_heat: Floats
+    power: Floats
+    speed: Floats
+    peak_torque: Floats
+    roll: Floats
+    pitch: Floats
+    foot_clearance: Floats
+    slip: Floats
 
     @classmethod
-    def of(cls, rows: NDArray[np.float64]) -> Measurements:
+    def of(cls, rows: Floats) -> Measurements:
         """Create measurements from rows (n, 10), columns as in `MEASUREMENTS`."""
         return cls(**dict(zip(MEASUREMENT_NAMES, rows.T.copy(), strict=True)))
 
-    def array(self) -> NDArray[np.float64]:
+    def array(self) -> Floats:
         """Return an array (n, 10), columns as in `MEASUREMENTS`."""
         return np.stack([getattr(self, name) for name in MEASUREMENT_NAMES], axis=1)

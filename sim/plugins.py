@@ -11,7 +11,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Generic, Literal, Protocol, TypeVar, get_args
+from typing import Any, Final, Generic, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -250,21 +250,10 @@ class Registry(MutableMapping[str, T]):
             ) from error
 
 
-class Names(Protocol):
-    """Known names, which may grow when plug-ins are loaded."""
-
-    def __contains__(self, name: object, /) -> bool: ...
-
-    def __iter__(self) -> Iterator[str]: ...
-
-    def unknown(self, name: str) -> str:
-        """Return an error message about an unknown name."""
-
-
 class KnownName:
     """Annotation of a `str` that must be a known name; plug-ins' names included."""
 
-    def __init__(self, names: Names) -> None:
+    def __init__(self, names: Registry[Any]) -> None:
         self._names = names
 
     def __get_pydantic_core_schema__(

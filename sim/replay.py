@@ -7,9 +7,8 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gaitswarm.sim.arrays import Floats
+from gaitswarm.sim.arrays import Floats, Ints
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.robot.robot import Robot
@@ -81,10 +80,10 @@ def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Rep
     )
 
 
-def ticks_at(rate: float, ticks: int) -> NDArray[np.int64]:
+def ticks_at(rate: float, ticks: int) -> Ints:
     """Return control ticks (F,) below `ticks` that are nearest to multiples of 1 / rate [Hz]."""
     frames = np.rint(np.arange(ticks * rate / CONTROL_RATE + 1.0) * (CONTROL_RATE / rate))
-    nearest: NDArray[np.int64] = frames[frames < ticks].astype(np.int64)
+    nearest: Ints = frames[frames < ticks].astype(np.int64)
     return nearest
 
 

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.assembly import (
     PHYSICS_RATE,
     Backend,
@@ -64,7 +64,7 @@ def simulate(
     scenario: Scenario,
     controller: str | ControlLaw,
     variables: Sequence[str],
-    designs: NDArray[np.float64],
+    designs: Floats,
     *,
     robot: RobotChoice = DEFAULT_ROBOT,
     planner: Robot | None = None,
@@ -121,7 +121,7 @@ def simulating(
     scenario: Scenario,
     controller: str | ControlLaw,
     variables: Sequence[str],
-    designs: NDArray[np.float64],
+    designs: Floats,
     *,
     robot: RobotChoice,
     planner: Robot | None = None,
@@ -270,7 +270,7 @@ def lanes(precision: Precision = "double") -> int:
 def _check_arguments(
     controller: str | ControlLaw,
     variables: Sequence[str],
-    designs: NDArray[np.float64],
+    designs: Floats,
     physics_rate: int,
 ) -> None:
     if isinstance(controller, ControlLaw):

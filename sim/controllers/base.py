@@ -12,13 +12,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Ints
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, descale
 from gaitswarm.sim.controllers.mamdani import Mamdani
 from gaitswarm.sim.controllers.quantisation import Axis
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.variables import Variable
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gaitswarm.sim.arrays import Ints
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.variables import Variable, listed_variables
+from gaitswarm.sim.variables import listed_variables
 
 FRACTION_BITS: Final = 16
 """Of proportional gains and table index scales."""
@@ -70,15 +68,6 @@ def required_integer(design: Mapping[str, float], name: str, *, low: int, high: 
     return int(value)
 
 
-def given_or_default(
-    design: Mapping[str, float], variable: Variable, low: float, high: float
-) -> float:
-    """Return a convention's value, checked against what the controller can represent."""
-    if variable.name not in design and variable.default is not None:
-        return variable.default
-    return required(design, variable.name, low=low, high=high)
-
-
 def to_fixed(value: float, fraction_bits: int) -> int:
     """Convert to the nearest fixed-point number.
 
@@ -89,9 +78,9 @@ def to_fixed(value: float, fraction_bits: int) -> int:
     return math.floor(value * (1 << fraction_bits) + 0.5)
 
 
-def descale(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
+def descale(value: Ints, bits: int) -> Ints:
     """Fixed point to integer, halves up."""
-    integer: NDArray[np.int64] = (value + (1 << (bits - 1))) >> bits
+    integer: Ints = (value + (1 << (bits - 1))) >> bits
     return integer
 
 

@@ -12,7 +12,7 @@ docs/model.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -28,7 +28,6 @@ from gaitswarm.sim.controllers.base import (
 from gaitswarm.sim.controllers.fixed_point import (
     CONVENTIONS,
     FRACTION_BITS,
-    given_or_default,
     integral_gain,
     required,
     required_integer,
@@ -60,12 +59,13 @@ class MembershipSets:
     extreme_peak: float | None = None  # None for an output without extremes
 
     @classmethod
-    def of(cls, design: Mapping[str, float], conventions: Iterable[Variable]) -> MembershipSets:
+    def of(cls, design: Mapping[str, float], conventions: Collection[Variable]) -> MembershipSets:
+        values = {v.name: v.default for v in conventions if v.default is not None} | dict(design)
         return cls(
             **{
-                variable.name: given_or_default(design, variable, *_LIMITS[variable.name])
-                for variable in conventions
-                if variable.name in _LIMITS
+                v.name: required(values, v.name, low=_LIMITS[v.name][0], high=_LIMITS[v.name][1])
+                for v in conventions
+                if v.name in _LIMITS
             }
         )
 

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats, Ints
 from gaitswarm.sim.compiler.compilation import load_library, vector_header
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, to_fixed
 from gaitswarm.sim.controllers.mamdani import Mamdani
@@ -31,7 +32,7 @@ class Axis:
     bits: int  # of the index
     centred: bool  # symmetric about zero, like errors; otherwise from zero up, like currents
 
-    def grid(self) -> NDArray[np.float64]:
+    def grid(self) -> Floats:
         """Shares of the input's range at the indices, (2 ** bits,).
 
         Zero falls on the middle index of a centred axis, so the first index repeats the second.
@@ -60,9 +61,7 @@ class ExactInference:
     current_range: float  # coded counts of share 1
     output_range: float  # PWM counts of share 1
 
-    def respond(
-        self, error: NDArray[np.int64], current: NDArray[np.int64], change: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
+    def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
         del change
         crisp = self.system.infer_at(
             {
@@ -127,9 +126,7 @@ def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
     return Quantised(values, largest)
 
 
-def reference_table(
-    system: Mamdani, grid: Mapping[str, NDArray[np.float64]]
-) -> tuple[NDArray[np.int8], float]:
+def reference_table(system: Mamdani, grid: Mapping[str, Floats]) -> tuple[NDArray[np.int8], float]:
     """Oracle of the compiled table, and its replacement without a compiler.
 
     The grid has the values (n_i,) of the inputs, in order. Returns values in 1/127ths of the
@@ -141,7 +138,7 @@ def reference_table(
 
 
 def compiled_table(
-    system: Mamdani, grid: Mapping[str, NDArray[np.float64]], *, library: ctypes.CDLL | None = None
+    system: Mamdani, grid: Mapping[str, Floats], *, library: ctypes.CDLL | None = None
 ) -> tuple[NDArray[np.int8], float] | None:
     """`reference_table` in a fraction of a millisecond, with the same bits."""
     *firsts, inner = system.degrees(grid)
@@ -182,7 +179,7 @@ def compiled_table(
     return values, float(largest)
 
 
-def _both_hold(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _both_hold(a: Floats, b: Floats) -> Floats:
     """Degrees (rules, n) and (rules, m) over the product of their values: (rules, n m)."""
     return np.minimum(a[:, :, np.newaxis], b[:, np.newaxis, :]).reshape(len(a), -1)
 

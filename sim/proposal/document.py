@@ -361,20 +361,12 @@ def _shared_beginning(names: Sequence[str]) -> str:
     return "".join(letters[0] for letters in alike)
 
 
-SECONDS: Final = 40.0
-"""Time limit of a proposal [s]; one takes tenths of a second, the first a second more."""
-
-CPU_SECONDS: Final = 20
-
-MEMORY: Final = 2 << 30
-"""Address space of a proposing process [B], of which it needs a tenth."""
-
 PROCESSES: Final = LimitedProcesses(
     "gaitswarm.sim.proposal.document",
     count=1,
-    seconds=SECONDS,
-    cpu_seconds=CPU_SECONDS,
-    memory=MEMORY,
+    seconds=40.0,  # a proposal takes tenths of a second, the first one a second more
+    cpu_seconds=20,
+    memory=2 << 30,  # of which it needs a tenth
 )
 
 

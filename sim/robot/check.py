@@ -11,15 +11,7 @@ from gaitswarm.sim.robot import bounds
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.shapes import visible_links
-from gaitswarm.sim.robot.variant import PASSED, digest_of
-
-SECONDS: Final = 20.0
-"""Time limit of a check [s]; one takes hundredths of a second, the first one a second."""
-
-CPU_SECONDS: Final = 10
-
-MEMORY: Final = 2 << 30
-"""Address space of a checking process [B], of which it needs a tenth."""
+from gaitswarm.sim.robot.variant import checks_of, digest_of
 
 MOST_ROBOTS: Final = 16
 """Robots given by files in one document, at most."""
@@ -27,7 +19,11 @@ MOST_ROBOTS: Final = 16
 Location = tuple[str | int, ...]
 
 PROCESSES: Final = LimitedProcesses(
-    "gaitswarm.sim.robot.check", count=2, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
+    "gaitswarm.sim.robot.check",
+    count=2,
+    seconds=20.0,  # a check takes hundredths of a second, the first one a second
+    cpu_seconds=10,
+    memory=2 << 30,  # of which it needs a tenth
 )
 
 
@@ -35,8 +31,8 @@ def check_files(toml: str, urdf: str) -> None:
     """Check a robot's files in another process; files that passed are remembered."""
     bounds.check_toml(toml)
     bounds.check_urdf(urdf)
-    digest = digest_of(toml, urdf)
-    if PASSED.has(digest):
+    checks = checks_of(digest_of(toml, urdf))
+    if "passed" in checks:
         return
     try:
         PROCESSES.ask({"toml": toml, "urdf": urdf})
@@ -44,7 +40,7 @@ def check_files(toml: str, urdf: str) -> None:
         raise RobotFileError(f"the robot cannot be used: checking it {error}") from error
     except SimulationInputError as error:
         raise RobotFileError(str(error)) from error
-    PASSED.add(digest)
+    checks.add("passed")
 
 
 def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:

@@ -128,19 +128,17 @@ def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescrip
     for leg in d.legs:
         names = list(leg.actuators)
         for index, joint in enumerate(leg.joints):
-            variable, friction = f"efficiency_{joint}", f"viscous_friction_{joint}"
-            actuator = actuators[names[index]]
-            if friction in values and isinstance(actuator, TorqueActuator):
-                own = f"of {joint}"
-                actuators[own] = _changed(actuator, {"viscous_friction": friction}, values)
-                names[index] = own
-            if variable in values and isinstance(actuator, Actuator):
-                own = f"of {joint}"
-                gearheads[own] = _changed(
-                    gearheads[actuator.gearhead], {"efficiency": variable}, values
-                )
+            actuator, own = actuators[names[index]], f"of {joint}"
+            field = "efficiency" if isinstance(actuator, Actuator) else "viscous_friction"
+            variables = {field: f"{field}_{joint}"}
+            if variables[field] not in values:
+                continue
+            if isinstance(actuator, Actuator):
+                gearheads[own] = _changed(gearheads[actuator.gearhead], variables, values)
                 actuators[own] = actuator.model_copy(update={"gearhead": own})
-                names[index] = own
+            else:
+                actuators[own] = _changed(actuator, variables, values)
+            names[index] = own
         by_field = {variable.name: f"{variable.name}_{leg.name}" for variable in _OF_LEGS}
         own_contact = leg.contact
         if not values.keys().isdisjoint(by_field.values()):

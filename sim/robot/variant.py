@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-import threading
 import tomllib
-from collections import OrderedDict
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
@@ -30,8 +28,6 @@ from gaitswarm.sim.robot.description import AnyActuator, ContactLaw, Leg, Planne
 if TYPE_CHECKING:
     from gaitswarm.sim.robot.robot import Robot
 
-_REMEMBERED: Final = 1024
-
 
 def digest_of(toml: str, urdf: str) -> bytes:
     # Invalid Unicode is rejected later, by name.
@@ -39,32 +35,15 @@ def digest_of(toml: str, urdf: str) -> bytes:
     return hashlib.sha256(b"%d " % len(toml) + b"".join(texts)).digest()
 
 
-class _Digests:
-    """Set of digests that drops the least recently used. Thread-safe."""
+@lru_cache(maxsize=1024)
+def checks_of(digest: bytes) -> set[Literal["passed", "read"]]:
+    """Return the checks that files have passed in this process, to which callers add.
 
-    def __init__(self) -> None:
-        self._digests: OrderedDict[bytes, None] = OrderedDict()
-        self._lock = threading.Lock()
+    passed: that of `gaitswarm.sim.robot.check.check_files`; read: a robot was built from them.
+    """
+    del digest
+    return set()
 
-    def has(self, digest: bytes) -> bool:
-        with self._lock:
-            present = digest in self._digests
-            if present:
-                self._digests.move_to_end(digest)
-            return present
-
-    def add(self, digest: bytes) -> None:
-        with self._lock:
-            self._digests[digest] = None
-            if len(self._digests) > _REMEMBERED:
-                self._digests.popitem(last=False)
-
-
-PASSED: Final = _Digests()
-"""Files that passed `gaitswarm.sim.robot.check.check_files` in this process."""
-
-READ: Final = _Digests()
-"""Files that this process has built a robot from."""
 
 RobotName = Literal["szabadka2", "szabadka2-identified", "szabadka2-reconstructed"]
 """Robots shipped with gaitswarm."""
@@ -140,11 +119,11 @@ class RobotFiles(BaseModel):
 
     @model_validator(mode="after")
     def _is_a_robot(self) -> RobotFiles:
-        digest = digest_of(self.toml, self.urdf)
+        checks = checks_of(digest_of(self.toml, self.urdf))
         # Listing jobs validates their robots every time.
-        if not (PASSED.has(digest) or READ.has(digest)):
+        if not checks:
             _load_files(self)
-            READ.add(digest)
+            checks.add("read")
         return self
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from gaitswarm import optimize
-from gaitswarm.services.optimizer.jobs.constraints import no_worse_than
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
@@ -34,7 +34,10 @@ DEMO: Final = JobSpec(preference="A", iterations=25, seed=2)
 """The job of `make demo`, by the default search method: 625 designs."""
 
 GAIT_DEMO: Final = JobSpec(
-    preference="A", iterations=25, seed=1, constraints=(no_worse_than("published:A"),)
+    preference="A",
+    iterations=25,
+    seed=1,
+    constraints=(Constraint(quantity="*", relative_to="published:A", max=1.0),),
 ).with_gait_searched()
 """The second job of `make demo`: controller and gait, no worse than the published optimum."""
 

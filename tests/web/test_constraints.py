@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from gaitswarm.services.optimizer.jobs.constraints import no_worse_than
+from gaitswarm.services.optimizer.jobs.constraints import Constraint
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
@@ -66,7 +66,9 @@ def test_the_default_job_searches_the_gait_too_and_is_no_worse_than_the_publishe
     spec = job["spec"]
     (constraint,) = spec["constraints"]
     assert (constraint["quantity"], constraint["relative_to"]) == ("*", "published:A")
-    expected = JobSpec(constraints=(no_worse_than("published:A"),)).with_gait_searched()
+    expected = JobSpec(
+        constraints=(Constraint(quantity="*", relative_to="published:A", max=1.0),)
+    ).with_gait_searched()
     searched = {v["name"]: (v["low"], v["high"]) for v in spec["variables"]}
     assert searched == {v.name: (v.low, v.high) for v in expected.design_space().variables}
     assert list(spec["scenario_weights"].values()) == [2.0]

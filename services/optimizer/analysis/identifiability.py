@@ -147,11 +147,11 @@ def identifiability(
             for run, row in zip(runs, best, strict=True)
         ]
         choices = _choices(variable, column, runs, near)
-        trust = None
+        trust = explanation = None
         if len(runs) > 1:
             equally_good = interval(column, near)
             width = (equally_good.high - equally_good.low) / (variable.high - variable.low)
-            trust = _trust(choices, width)
+            trust, explanation = _trust(choices, width)
         parameters.append(
             ParameterView(
                 name=variable.name,
@@ -163,7 +163,7 @@ def identifiability(
                 intervals=[interval(column, good) for good in within],
                 choices=choices,
                 trust=trust,
-                explanation=None if trust is None else _explanation(trust, choices),
+                explanation=explanation,
             )
         )
     return IdentifiabilityView(
@@ -226,27 +226,19 @@ def _choices(
     return choices
 
 
-def _trust(choices: Sequence[ChoiceView], width: float) -> Trust:
+def _trust(choices: Sequence[ChoiceView], width: float) -> tuple[Trust, str]:
     """width: of the interval of equally good designs, as a share of the range."""
-    if choices:
-        remaining = sum(choice.remains for choice in choices)
-        if remaining == len(choices):
-            return Trust.UNKNOWN
-        return Trust.TRUSTED if remaining == 1 else Trust.ROUGH
-    if width > _ROUGH:
-        return Trust.UNKNOWN
-    return Trust.TRUSTED if width <= _TRUSTED else Trust.ROUGH
-
-
-def _explanation(trust: Trust, choices: Sequence[ChoiceView]) -> str:
-    if not choices:
-        return _PHRASES[trust]
     remaining = [choice.name for choice in choices if choice.remains]
-    if trust is Trust.TRUSTED:
-        return f"only the choice {remaining[0]} comes close to the best"
-    if trust is Trust.ROUGH:
-        return f"undecided between {', '.join(remaining)}; the others are worse"
-    return "every choice comes close to the best: these walks do not determine it"
+    if not choices:
+        trust = Trust.TRUSTED if width <= _TRUSTED else Trust.ROUGH
+        trust = Trust.UNKNOWN if width > _ROUGH else trust
+        return trust, _PHRASES[trust]
+    if len(remaining) == len(choices):
+        text = "every choice comes close to the best: these walks do not determine it"
+        return Trust.UNKNOWN, text
+    if len(remaining) == 1:
+        return Trust.TRUSTED, f"only the choice {remaining[0]} comes close to the best"
+    return Trust.ROUGH, f"undecided between {', '.join(remaining)}; the others are worse"
 
 
 LeaveOut = Literal["target", "walk"]

@@ -55,7 +55,7 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.case import run_together
 from gaitswarm.sim.catalogue import GAIT_VARIABLES, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.errors import SimulationError, SimulationInputError
+from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS, Outcome, Status
 
@@ -214,10 +214,7 @@ def _complete_design(spec: JobSpec, design: Mapping[str, float | str]) -> dict[s
     missing = [v.name for v in law.variables if v.name not in design]
     if missing:
         raise ValueError(f"the design has no {', '.join(missing)}")
-    try:
-        return adapted_to_job({}, spec) | design_numbers(spec.controller, design)
-    except SimulationInputError as error:
-        raise ValueError(str(error)) from error
+    return adapted_to_job({}, spec) | design_numbers(spec.controller, design)
 
 
 def with_other_reference(

@@ -179,11 +179,6 @@ Constraints = Annotated[
 ]
 
 
-def no_worse_than(reference: ReferenceChoice) -> Constraint:
-    """Return the constraint that no objective f1 to f5 exceeds a reference's in any scenario."""
-    return Constraint(quantity=ALL, relative_to=reference, max=1.0)
-
-
 class Limit(NamedTuple):
     """A limit on one quantity in one case."""
 

@@ -35,7 +35,6 @@ from gaitswarm.sim.calibration import (
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.catalogue import GAIT_CATALOGUE, design_shown, orders_searched
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.identification import LINK_CURRENTS, CurrentFit, Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.outcome import RESULTS, Objective
@@ -325,11 +324,8 @@ class CalibrationSpec(Spec):
 
     def catalogue(self) -> tuple[Variable, ...]:
         """Return all variables of robot, controllers and gait, which have different names."""
-        try:
-            of_robot = robot_variables(self.robot_sources)
-            of_walks = walk_variables(walk.controller for walk in self.walks)
-        except SimulationInputError as error:
-            raise ValueError(str(error)) from error
+        of_robot = robot_variables(self.robot_sources)
+        of_walks = walk_variables(walk.controller for walk in self.walks)
         for variable in of_walks:
             if any(variable.name == other.name for other in of_robot):
                 raise ValueError(

@@ -28,7 +28,6 @@ from gaitswarm.sim.catalogue import (
     with_gait,
 )
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.identification import Recordings
 from gaitswarm.sim.input import check_distinct
 from gaitswarm.sim.mujoco.engines import (
@@ -116,7 +115,7 @@ def _derived(
         try:
             scenario = Scenario.model_validate(fastest.model_dump() | changes | {"name": name})
             check_reach(scenario, tuple(design), tuple(design.values()), robot=robot)
-        except (ValueError, SimulationInputError):
+        except ValueError:
             # Out of a scenario's bounds, or of the legs' reach.
             continue
         other = _unnamed(with_gait(scenario, gait))

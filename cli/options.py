@@ -262,7 +262,7 @@ TerrainOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class GivenOptions:
     """Options of which None says that the user did not pass them."""
 
@@ -272,7 +272,7 @@ class GivenOptions:
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class SpecOptions(GivenOptions):
     """Options of commands that submit a job; None keeps the value of the spec file.
 
@@ -326,7 +326,7 @@ class SpecOptions(GivenOptions):
     name: JobName = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class WorkerOptions:
     """Options of commands that run jobs, named as the settings that they override.
 
@@ -347,7 +347,7 @@ class WorkerOptions:
     cache: Annotated[bool | None, typer.Option("--cache/--no-cache")] = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class RunnerOptions(WorkerOptions):
     """Options of commands that run queued jobs.
 
@@ -358,7 +358,7 @@ class RunnerOptions(WorkerOptions):
     concurrent_jobs: Annotated[int | None, typer.Option("--jobs", min=1, max=256)] = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class Place:
     """Options of commands about jobs: where the jobs are."""
 

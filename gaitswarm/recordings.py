@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from datetime import datetime
 
 from pydantic import Field
@@ -71,7 +70,7 @@ class RecordingEntryView(RecordingBase):
 
     @classmethod
     def from_entry(cls, entry: RecordingEntry) -> RecordingEntryView:
-        return cls(**asdict(entry), seconds=entry.rows * CONTROL_PERIOD)
+        return cls(**entry._asdict(), seconds=entry.rows * CONTROL_PERIOD)
 
 
 class SignalView(View):

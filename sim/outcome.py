@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +53,7 @@ _PHRASES: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Objective:
+class Objective(NamedTuple):
     """A column of results, minimized or measured: name in tables and JSON, unit, description."""
 
     name: str
@@ -139,8 +138,7 @@ class Outcome:
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Measurements:
+class Measurements(NamedTuple):
     """Measurements of n designs, each (n,), NaN where a walk ended early; see `MEASUREMENTS`."""
 
     peak_current: Floats

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class CertificateOptions(GivenOptions):
     """Options that make the spec; None keeps the value of an earlier certificate.
 

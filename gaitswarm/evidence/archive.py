@@ -494,7 +494,7 @@ def best_of(columns: EvaluationColumns, reevaluated: EvaluationColumns | None) -
     )
     (searched,) = evaluations_of(columns.rows(rows))
     again = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
-    return replace(searched, reevaluation=again)
+    return searched._replace(reevaluation=again)
 
 
 def in_double(

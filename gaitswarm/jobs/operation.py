@@ -10,7 +10,17 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial, wraps
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar, cast, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    cast,
+    get_type_hints,
+)
 
 from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.fields import FieldInfo
@@ -49,8 +59,7 @@ PageLimit = Annotated[int, Field(ge=1, le=200)]
 SearchText = Annotated[str, Field(max_length=200)]
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """What one request may compute: length of all its simulations [s]."""
 
     simulated: float = math.inf
@@ -73,8 +82,7 @@ def _check_length(seconds: float, limit: float, advice: str, field: str) -> None
         raise InvalidRequest(text, field=field)
 
 
-@dataclass(frozen=True)
-class Context:
+class Context(NamedTuple):
     """What a server adds to the arguments of an operation: the client, and what it may do."""
 
     actor: str = LOCAL

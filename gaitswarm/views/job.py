@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 from pydantic import ConfigDict, Field
 
@@ -63,8 +62,7 @@ class BestView(EvaluationView):
                 fitness=found,
                 difference=found / reevaluation.fitness - 1.0 if reevaluation.fitness else 0.0,
             )
-            evaluation = replace(
-                evaluation,
+            evaluation = evaluation._replace(
                 objectives=reevaluation.objectives,
                 statuses=reevaluation.statuses,
                 fitness=reevaluation.fitness,
@@ -105,8 +103,7 @@ class HistoryIterationView(IterationView):
     evaluations: list[EvaluationView] = Field(description="Every design, in order.")
 
 
-@dataclass(frozen=True, slots=True)
-class Spent:
+class Spent(NamedTuple):
     """How much of a budget is spent. Its text is `12 of 25 iterations`."""
 
     done: int

@@ -20,11 +20,10 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from gaitswarm.sim.compiler import cache
 from gaitswarm.sim.errors import KernelBuildError
@@ -41,8 +40,7 @@ def host_architecture() -> str:
     return _SPELLINGS.get(machine, machine)
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """Target of a compilation."""
 
     lanes: int  # doubles in a vector register
@@ -134,8 +132,7 @@ _ADVICE: Final[Mapping[str, str]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Compiler:
+class Compiler(NamedTuple):
     """A C compiler: its command, and the first line of its version."""
 
     command: tuple[str, ...]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,8 +80,7 @@ class Response(Protocol):
         """
 
 
-@dataclass(frozen=True, slots=True)
-class JointPd:
+class JointPd(NamedTuple):
     """PD of torque-controlled actuators, at their own rate between control ticks.
 
     tau = stiffness (q_d - q) + damping (dq_d - dq) + feed_forward tau_ff, added to the torque
@@ -135,8 +134,7 @@ class ControlLaw:
         return pd.stiffness, pd.damping, pd.feed_forward
 
 
-@dataclass(frozen=True, slots=True)
-class Universe:
+class Universe(NamedTuple):
     """An input or output of a fuzzy inference, which computes with shares of it.
 
     Attributes:
@@ -151,8 +149,7 @@ class Universe:
     counts: float = 1.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Inference:
+class Inference(NamedTuple):
     """One output of a fuzzy controller: the inference, and the table that replaces it on the robot.
 
     Attributes:

@@ -13,10 +13,9 @@ docs/model.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 from gaitswarm.sim.controllers.base import (
     ControlLaw,
@@ -48,8 +47,7 @@ SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
 _LIMITS: Final = listed_limits("convention")
 
 
-@dataclass(frozen=True, slots=True)
-class MembershipSets:
+class MembershipSets(NamedTuple):
     """Sets of a current's absolute value and of an output, by the conventions of the same names."""
 
     large_begins: float

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache, reduce
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,7 @@ class Shape(IntEnum):
     PI = 3
 
 
-@dataclass(frozen=True, slots=True)
-class FuzzySet:
+class FuzzySet(NamedTuple):
     """A symmetric membership function."""
 
     peak: float  # position of membership one
@@ -50,8 +49,7 @@ class FuzzySet:
         return np.where(distance <= 0.5, inner, outer)
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(NamedTuple):
     """IF every antecedent holds THEN consequent."""
 
     antecedents: Mapping[str, str]  # name of the set, by input; inputs left out do not matter

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from importlib import resources
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ OUTPUT_SCALE: Final = 127
 """Table value of the largest output in the table."""
 
 
-@dataclass(frozen=True, slots=True)
-class Axis:
+class Axis(NamedTuple):
     """One input of a table."""
 
     bits: int  # of the index
@@ -77,8 +76,7 @@ def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1)
     return outputs * output_bits * (1 << sum(input_bits)) // 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Quantised:
+class Quantised(NamedTuple):
     """An inference in 8 bits."""
 
     # (2 ** bits of each axis) in 1/127ths of the largest output, read-only

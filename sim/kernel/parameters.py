@@ -13,12 +13,8 @@ import numpy as np
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.robot.description import (
-    DIRECTIONAL_FRICTION,
-    JOINTS_PER_LEG,
-    ContactLaw,
-    DryFriction,
-)
+from gaitswarm.sim.robot.bounds import ContactLaw
+from gaitswarm.sim.robot.description import DIRECTIONAL_FRICTION, JOINTS_PER_LEG, DryFriction
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.robot.urdf import parallel_axis
 from gaitswarm.sim.scenario import Scenario

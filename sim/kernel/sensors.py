@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel import LARGEST_DELAY
 
 Words = NDArray[np.uint64]
 Integers = NDArray[np.int64]
-
-LARGEST_DELAY: Final = 15
-"""Of a sensor [control ticks]."""
 
 _BYTES: Final = 8
 """Number of bytes whose sum is a reading's noise (Irwin-Hall distribution): exact, and normal

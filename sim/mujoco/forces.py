@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 from gaitswarm.sim.robot.robot import Robot
 
 

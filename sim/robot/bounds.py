@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 from xml.parsers import expat
 
 from pydantic import AfterValidator, Field
@@ -79,6 +79,12 @@ PartName = Annotated[Line, Field(min_length=1, max_length=LONGEST_NAME)]
 
 Sentence = Annotated[Line, Field(min_length=1, max_length=LONGEST_ATTRIBUTE)]
 """A sentence about a robot for users."""
+
+ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
+"""Friction law of soles; see `gaitswarm.sim.kernel.dynamics.contact`."""
+
+PlannedSoles = Literal["nominal", "own"]
+"""Sole lengths that a gait assumes: the robot's common one, or each leg's."""
 
 
 def check_toml(text: str) -> None:

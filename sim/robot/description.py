@@ -14,7 +14,15 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.input import Data, Lines
 from gaitswarm.sim.near_names import instead_of
-from gaitswarm.sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName, Sentence
+from gaitswarm.sim.robot.bounds import (
+    LONGEST_LEG_NAME,
+    MOST_LEGS,
+    ContactLaw,
+    Number,
+    PartName,
+    PlannedSoles,
+    Sentence,
+)
 
 ActuatorKind = Literal["dc", "torque"]
 """What a controller commands: a DC motor's voltage, or an actuator's torque."""
@@ -319,13 +327,6 @@ class Sensors(Data):
         description="time constant of the first-order low-pass of the absolute current before the"
         " ADC; 0 for none [s]",
     )
-
-
-ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
-"""Friction law of soles; see `gaitswarm.sim.kernel.dynamics.contact`."""
-
-PlannedSoles = Literal["nominal", "own"]
-"""Sole lengths that a gait assumes: the robot's common one, or each leg's."""
 
 
 class Contact(Data):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import tomllib
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
@@ -22,10 +21,12 @@ from gaitswarm.sim.robot.bounds import (
     MOST_LEGS,
     MOST_LINKS,
     MOST_VALUES,
+    ContactLaw,
+    PlannedSoles,
 )
-from gaitswarm.sim.robot.description import AnyActuator, ContactLaw, Leg, PlannedSoles
 
 if TYPE_CHECKING:
+    from gaitswarm.sim.robot.description import AnyActuator, Leg
     from gaitswarm.sim.robot.robot import Robot
 
 
@@ -57,6 +58,8 @@ SHIPPED: Final[tuple[RobotName, ...]] = get_args(RobotName)
 @lru_cache(maxsize=8)
 def shipped_robot(name: str) -> Robot:
     """Load a robot that ships with gaitswarm."""
+    import tomllib
+
     from gaitswarm.sim.robot.identifiable import with_parameters
     from gaitswarm.sim.robot.robot import parse_robot
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from unittest.mock import patch
 
 import httpx2
@@ -234,5 +233,5 @@ def test_in_many_worlds_the_reference_walks_in_them_too() -> None:
     assert many.fitness is not None and nominal.fitness is not None
     assert many.fitness != nominal.fitness
     for reference, cases in ((many, 2), (nominal, 1)):
-        assert replace(reference, fitness=0.0, results=b"") == Reference("A", 0.0)
+        assert reference._replace(fitness=0.0, results=b"") == Reference("A", 0.0)
         assert reference.objectives(cases).shape == (cases, len(RESULTS))

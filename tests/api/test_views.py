@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any, get_args
 
 import numpy as np
@@ -133,7 +133,7 @@ def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
     )
     spec = job.spec.model_copy(update={"precision": "single"})
 
-    view = BestView.from_evaluation(replace(found, reevaluation=doubled), spec)
+    view = BestView.from_evaluation(found._replace(reevaluation=doubled), spec)
 
     assert view.fitness == doubled.fitness
     walks = [

@@ -35,7 +35,8 @@ RARE = (
     "gaitswarm.cli.commands.analysis", "gaitswarm.jobs.server", "gaitswarm.jobs.types",
     "gaitswarm.robots", "gaitswarm.services.optimizer.jobs.designs", "gaitswarm.services.runtime",
     "gaitswarm.services.optimizer.run.runner", "gaitswarm.simulation", "gaitswarm.sim.assembly",
-    "gaitswarm.sim.case", "gaitswarm.sim.kernel.walk", "gaitswarm.sim.robot.robot",
+    "gaitswarm.sim.case", "gaitswarm.sim.kernel.sensors", "gaitswarm.sim.kernel.walk",
+    "gaitswarm.sim.robot.description", "gaitswarm.sim.robot.robot", "rich._emoji_codes",
     "sqlalchemy.dialects.postgresql",
     *(
         f"gaitswarm.services.optimizer.jobs.kinds.{other}"

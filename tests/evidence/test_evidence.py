@@ -46,7 +46,7 @@ class Earlier(JobService):
         committed = job.progress.best_iteration
         assert committed, "the best design is of the first iteration: choose another seed"
         rows = self.store.evaluations_between(job_id, 0, committed)
-        progress = replace(job.progress, iterations=committed, evaluations=len(rows))
+        progress = job.progress._replace(iterations=committed, evaluations=len(rows))
         return replace(job, state=JobState.RUNNING, progress=progress)
 
 

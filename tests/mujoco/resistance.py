@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.mujoco.forces import Ground
 from gaitswarm.sim.mujoco.model import model
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 from gaitswarm.sim.robot.robot import Robot
 
 Floats = NDArray[np.float64]

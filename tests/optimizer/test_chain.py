@@ -142,11 +142,11 @@ def one_ulp(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
 
 
 def test_one_bit_of_anything_makes_another_digest() -> None:
-    better = replace(REEVALUATION, fitness=math.nextafter(2.5, 0.0))
+    better = REEVALUATION._replace(fitness=math.nextafter(2.5, 0.0))
     other_status = np.array([[Status.OK], [Status.DIVERGED]], dtype=np.uint8)
     changed = [
         digest(before="c" * 64),
-        digest(documents=replace(DOCUMENTS, provenance=[{"from_iteration": 0, "code": "c"}])),
+        digest(documents=DOCUMENTS._replace(provenance=[{"from_iteration": 0, "code": "c"}])),
         digest(link=replace(LINK, iteration=0)),
         digest(link=replace(LINK, positions=one_ulp(LINK.positions))),
         digest(link=replace(LINK, ask_digest="d" * 64)),
@@ -159,8 +159,8 @@ def test_one_bit_of_anything_makes_another_digest() -> None:
         digest(reevaluation=better),
     ]
     assert len({digest(), *changed}) == 1 + len(changed)
-    assert replace(DOCUMENTS, spec={"seed": 4}).digest != DOCUMENTS.digest
-    assert replace(DOCUMENTS, lineage={"parent": "x"}).digest != DOCUMENTS.digest
+    assert DOCUMENTS._replace(spec={"seed": 4}).digest != DOCUMENTS.digest
+    assert DOCUMENTS._replace(lineage={"parent": "x"}).digest != DOCUMENTS.digest
     assert ask_digest(LINK.positions, {"step": 0.5}) != ask_digest(LINK.positions, {"step": 0.25})
 
 
@@ -169,5 +169,5 @@ def test_the_provenance_of_an_iteration_is_the_last_that_began_by_then() -> None
     assert [record["code"] for record in at] == ["a", "a", "b", "b"]
     assert ChainDocuments({}).provenance_of(3) is None
     # Resumed with consent twice before anything was committed: the last counts.
-    twice = replace(DOCUMENTS, provenance=[*(DOCUMENTS.provenance or ()), {"from_iteration": 2}])
+    twice = DOCUMENTS._replace(provenance=[*(DOCUMENTS.provenance or ()), {"from_iteration": 2}])
     assert twice.provenance_of(2) == {"from_iteration": 2}

@@ -241,7 +241,7 @@ def test_the_best_design_is_the_best_feasible_one(store: Store) -> None:
     assert sum(i.infeasible for i in iterations) == job.progress.infeasible
     assert not check_history(store, job).problem
     for forged in ({"infeasible": 0}, {"least_violation": 0.5}):
-        edited = replace(job, progress=replace(job.progress, **forged))
+        edited = replace(job, progress=job.progress._replace(**forged))
         assert "infeasible designs are not those" in check_history(store, edited).problem
 
 

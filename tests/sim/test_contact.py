@@ -13,7 +13,7 @@ from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
 from gaitswarm.sim.kernel.dynamics.contact import FRICTION, foot_on_ground
 from gaitswarm.sim.kernel.dynamics.spatial import Motion
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 
 Floats = NDArray[np.float64]
 

@@ -179,7 +179,7 @@ def test_values_in_the_middle_between_two_are_rounded_alike() -> None:
 def test_a_system_that_is_odd_but_for_one_rule_has_the_same_bits(changed: int) -> None:
     odd = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
     rules = [
-        replace(rule, weight=0.9 * rule.weight) if k == changed else rule
+        rule._replace(weight=0.9 * rule.weight) if k == changed else rule
         for k, rule in enumerate(odd.rules)
     ]
     axes = {"error": Axis(7, True), "current": CURRENT}

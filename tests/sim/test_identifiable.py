@@ -10,7 +10,8 @@ import pytest
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.parameters import Layout, pack_parameters
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.sim.robot.description import ContactLaw, EnergyConvention, PlannedSoles
+from gaitswarm.sim.robot.bounds import ContactLaw, PlannedSoles
+from gaitswarm.sim.robot.description import EnergyConvention
 from gaitswarm.sim.robot.identifiable import (
     CONVENTIONAL_VARIABLES,
     identifiable_variables,

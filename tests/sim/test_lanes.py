@@ -21,7 +21,7 @@ from gaitswarm.sim.kernel.reference import reference_kernel
 from gaitswarm.sim.kernel.walk import Coding, LaneUse, WalkResult, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 from gaitswarm.sim.scenario import SCENARIOS
 
 LAWS: Final[tuple[ContactLaw, ...]] = ("linear_zone", "dead_zone", "karnopp", "stick")

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.kernel import Precision
+from gaitswarm.sim.kernel import LARGEST_DELAY, Precision
 from gaitswarm.sim.kernel.native import NativeKernel, native_kernel
 from gaitswarm.sim.kernel.reference import reference_kernel
-from gaitswarm.sim.kernel.sensors import LARGEST_DELAY, SensorErrors, Sensors, philox
+from gaitswarm.sim.kernel.sensors import SensorErrors, Sensors, philox
 from gaitswarm.sim.kernel.walk import Coding, WalkResult, WalkSetup
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from gaitswarm.sim.robot.robot import Robot

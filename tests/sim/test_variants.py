@@ -19,7 +19,7 @@ from gaitswarm.sim.kernel.walk import Coding
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.sim.simulate import simulate
 from tests.examples.robots import changed

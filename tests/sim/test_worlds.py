@@ -17,8 +17,8 @@ from gaitswarm.sim.case import run_together
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.kernel import LARGEST_DELAY
 from gaitswarm.sim.kernel.parameters import GRAVITY
-from gaitswarm.sim.kernel.sensors import LARGEST_DELAY
 from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
 from gaitswarm.sim.robot.identifiable import with_parameters

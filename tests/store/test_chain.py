@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -240,7 +239,7 @@ def test_a_design_that_was_reevaluated_is_chained_too(store: Store, database_url
     assert claim is not None
     store.begin(claim, ask(0))
     reevaluation = Reevaluation(0, np.full((2, 6), 0.5), np.zeros(2, dtype=np.uint8), 2.5)
-    done = replace(completed(0), precision="single", reevaluation=reevaluation)
+    done = completed(0)._replace(precision="single", reevaluation=reevaluation)
     store.commit(claim, done, ask(1))
     assert checked(store, claim.job.id).problem == ""
     execute(database_url, "UPDATE reevaluations SET fitness = 2.25")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
 from datetime import timedelta
 
 import pytest
@@ -177,8 +176,8 @@ def test_an_idempotency_key_is_free_again(store: Store) -> None:
 
 
 def test_designs_that_other_jobs_walked_stay_known(store: Store) -> None:
-    gone = ended(store, replace(completed(0), keys=(KEYS[0], None)))
-    ended(store, replace(completed(0), keys=(None, KEYS[1])))
+    gone = ended(store, completed(0)._replace(keys=(KEYS[0], None)))
+    ended(store, completed(0)._replace(keys=(None, KEYS[1])))
     assert set(store.known(KEYS)) == set(KEYS)
     store.delete_job(gone.id)
     store.purge_deleted()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -26,15 +25,14 @@ def begun(store: Store) -> Claim:
 
 def searched(index: int, fitness: tuple[float, ...], double: float | None) -> CompletedIteration:
     """An iteration whose best particle has fitness `double` in double; None: not reevaluated."""
-    done = replace(completed(index, fitness), precision="single")
+    done = completed(index, fitness)._replace(precision="single")
     if double is None:
         return done
     fell = math.isinf(double)
     objectives = np.full((2, 6), NAN if fell else double / 7.0)
     statuses = np.full(2, Status.FELL if fell else Status.OK, dtype=np.uint8)
-    return replace(
-        done, reevaluation=Reevaluation(int(np.argmin(fitness)), objectives, statuses, double)
-    )
+    reevaluation = Reevaluation(int(np.argmin(fitness)), objectives, statuses, double)
+    return done._replace(reevaluation=reevaluation)
 
 
 def test_both_precisions_of_the_best_design_are_kept_with_every_bit(store: Store) -> None:

@@ -61,7 +61,7 @@ def test_the_rest_takes_as_long_as_the_last_iterations_where_their_pace_is_anoth
         # Half of the workers have gone.
         pace = recent_pace(pace, 0.8)
     running = job(JobState.RUNNING, iterations=4)
-    slower = replace(running, progress=replace(running.progress, recent_seconds=pace))
+    slower = replace(running, progress=running.progress._replace(recent_seconds=pace))
     found = time_left(slower, NOW)
     assert found.eta_seconds == pytest.approx(30 * pace) and 20.0 < 30 * pace < 24.0
     assert found.evaluations_per_second == 2.5

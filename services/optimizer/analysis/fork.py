@@ -16,10 +16,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain, zip_longest
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -157,8 +156,7 @@ _REFERENCES_DEPEND_ON: Final = frozenset({"constraints", "scenarios", "robot"})
 """Fields of a request on which the values of references depend."""
 
 
-@dataclass(frozen=True, slots=True)
-class Parent:
+class Parent(NamedTuple):
     """The parent of a fork, and its iterations before the fork."""
 
     job: Job

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from enum import StrEnum
 from typing import Final, Literal
 
@@ -345,7 +344,7 @@ def _best_in_double(bests: Sequence[Evaluation]) -> tuple[int, Evaluation]:
     judged = [(a.fitness, run, a) for run, a in enumerate(reevaluations) if a is not None]
     fitness, run, result = min(judged, key=lambda entry: entry[:2])
     objectives, statuses = result.objectives, result.statuses
-    return run, replace(bests[run], objectives=objectives, statuses=statuses, fitness=fitness)
+    return run, bests[run]._replace(objectives=objectives, statuses=statuses, fitness=fitness)
 
 
 def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut | None) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import cbor2
 import numpy as np
@@ -34,8 +34,7 @@ _DIMENSIONS, _UINT8, _FLOAT64 = 40, 64, 86
 """Array tags of RFC 8746."""
 
 
-@dataclass(frozen=True, slots=True)
-class ChainDocuments:
+class ChainDocuments(NamedTuple):
     """Documents other than iterations that a job's chain depends on, as stored in JSON."""
 
     spec: Any  # as submitted

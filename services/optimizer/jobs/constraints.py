@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Final, NamedTuple, Self
 
@@ -189,8 +188,7 @@ class Limit(NamedTuple):
     bound: float
 
 
-@dataclass(frozen=True, slots=True)
-class Cases:
+class Cases(NamedTuple):
     """Cases of a job, for its constraints: names, scenarios by case, columns of a result."""
 
     names: Sequence[str]

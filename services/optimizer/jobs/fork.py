@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,8 +154,7 @@ class Lineage(BaseModel):
         return self.from_iteration if self.carried == "search" else 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TakenHistory:
+class TakenHistory(NamedTuple):
     """What a fork takes over besides its parent's rows."""
 
     state: dict[str, Any]  # the optimizer's dump after the last ask taken over
@@ -166,8 +164,7 @@ class TakenHistory:
     accepts_changes: bool = False  # whether the fork continues under another provenance
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fork:
+class Fork(NamedTuple):
     """Origin of a forked job, as stored."""
 
     lineage: Lineage

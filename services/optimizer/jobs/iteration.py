@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +58,7 @@ class EvaluationColumns:
         return self.rows(slice(int(np.searchsorted(self.iteration, iteration, "right")), None))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reevaluation:
+class Reevaluation(NamedTuple):
     """A design of a single-precision search, reevaluated in double precision."""
 
     particle: int
@@ -68,8 +67,7 @@ class Reevaluation:
     fitness: float  # minimized, +inf if any case failed
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluation:
+class Evaluation(NamedTuple):
     """A design's results in all cases of its job."""
 
     iteration: int
@@ -111,8 +109,7 @@ class Iteration:
     digest: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Ask:
+class Ask(NamedTuple):
     """An iteration to be evaluated, stored before evaluation; every number in it is finite."""
 
     iteration: int
@@ -120,16 +117,14 @@ class Ask:
     state: dict[str, Any]  # the optimizer's dump after the ask
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Answered:
+class Answered(NamedTuple):
     """A committed ask, from which the next one follows."""
 
     ask: Ask
     columns: EvaluationColumns
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JournalEntry:
+class JournalEntry(NamedTuple):
     """Outcomes of a task of an iteration that is not committed yet."""
 
     case: int  # index of the case
@@ -137,8 +132,7 @@ class JournalEntry:
     outcome: Outcome  # of these designs in the case
 
 
-@dataclass(frozen=True, slots=True)
-class CompletedIteration:
+class CompletedIteration(NamedTuple):
     """All that one transaction commits of an iteration."""
 
     iteration: int

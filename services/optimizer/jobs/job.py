@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final, Literal, TypedDict
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +48,7 @@ def weight(priority: int) -> float:
     return 2.0**priority
 
 
-@dataclass(frozen=True, slots=True)
-class Quota:
+class Quota(NamedTuple):
     """Limits on the whole budgets of one owner's jobs that have not ended."""
 
     jobs: int
@@ -175,8 +174,7 @@ def extended(state: JobState, committed: int, iterations: int) -> JobState:
     return JobState.QUEUED if state is JobState.SUCCEEDED else state
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
+class Progress(NamedTuple):
     """Committed iterations of a job."""
 
     iterations: int = 0
@@ -198,8 +196,7 @@ class Progress:
         return self.evaluations - self.evaluations_saved
 
 
-@dataclass(frozen=True, slots=True)
-class UnreadableSpec:
+class UnreadableSpec(NamedTuple):
     """What is known of a stored spec that this version cannot read."""
 
     reason: str  # why it cannot be read
@@ -213,8 +210,7 @@ ReferenceKind = Literal["published", "start", "job", "design"]
 GIVEN: Final = "given design"
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+class Reference(NamedTuple):
     """A design that others are compared with, evaluated in the cases of a job."""
 
     # study or preference for which it was published, `start design`, a job's id, or `GIVEN`; None
@@ -360,8 +356,7 @@ class Claim:
     journal: tuple[JournalEntry, ...] = ()  # what an earlier run has stored of the ask's evaluation
 
 
-@dataclass(frozen=True, slots=True)
-class Renewal:
+class Renewal(NamedTuple):
     """Result of renewing a claim."""
 
     state: JobState

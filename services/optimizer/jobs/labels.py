@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
@@ -61,8 +59,7 @@ class LabelsChange(BaseModel):
         )
 
 
-@dataclass(frozen=True, slots=True)
-class JobFilter:
+class JobFilter(NamedTuple):
     """Criteria of a job list; None for any, `own` for a custom robot or preference."""
 
     archived: bool | None = None
@@ -96,6 +93,8 @@ def robot_name(robot: RobotSource | None) -> str | None:
 @lru_cache(maxsize=256)
 def _name_in(toml: str) -> str:
     """Cached: lists may hold many jobs of one robot."""
+    import tomllib
+
     try:
         name = tomllib.loads(toml).get("name")
     except (tomllib.TOMLDecodeError, RecursionError):

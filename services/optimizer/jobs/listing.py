@@ -7,10 +7,9 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 from pydantic import Field
 
@@ -25,8 +24,7 @@ _LARGEST_PAGE: Final = 10_000
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-@dataclass(frozen=True, slots=True)
-class Page(Generic[T]):
+class Page(NamedTuple, Generic[T]):
     """A page of a list."""
 
     items: tuple[T, ...]
@@ -48,8 +46,7 @@ def every(page_after: Callable[[str | None], Page[T]]) -> Iterator[T]:
         yield from page.items
 
 
-@dataclass(frozen=True, slots=True)
-class Queue:
+class Queue(NamedTuple):
     """Numbers of jobs, and how long they wait."""
 
     jobs: Mapping[JobState, int]  # by state, for all states
@@ -58,8 +55,7 @@ class Queue:
     errors: tuple[str, ...] = ()  # beginnings of the errors of failed jobs
 
 
-@dataclass(frozen=True, slots=True)
-class RecordingEntry:
+class RecordingEntry(NamedTuple):
     """A recorded walk in a list."""
 
     id: str

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -19,8 +18,7 @@ LONGEST_PAUSE: Final = 3600.0
 _LONGEST_URL: Final = 2000
 
 
-@dataclass(frozen=True, slots=True)
-class Notification:
+class Notification(NamedTuple):
     """A message about a job that has ended."""
 
     id: str  # the same for every attempt, so that receivers can detect repetitions

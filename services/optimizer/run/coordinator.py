@@ -352,7 +352,7 @@ def _reevaluated(state: Coordination, event: Evaluated) -> Decision:
     seconds = done.evaluate_seconds + event.seconds
     return _commit(
         replace(state, failures=0),
-        replace(done, reevaluation=reevaluation, evaluate_seconds=seconds),
+        done._replace(reevaluation=reevaluation, evaluate_seconds=seconds),
     )
 
 

@@ -447,7 +447,7 @@ class _Run:
                 return self._evaluate(request, keys)
             case Commit(done=done, following=following):
                 place = getattr(self.context.evaluator, "place", None)
-                done = replace(done, evaluated_on=place)
+                done = done._replace(evaluated_on=place)
                 journaled, commit = self.journal.close(), self.context.store.commit
                 state = self._stored(
                     lambda: commit(self.claim, done, following, journaled=journaled)

@@ -7,8 +7,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from gaitswarm.services.optimizer.errors import Unavailable
 from gaitswarm.sim.errors import KernelBuildError
@@ -42,8 +41,7 @@ _CONNECTED_SECONDS: Final = 5.0
 """Duration after which an attempt counts as connected [s]; failures are faster."""
 
 
-@dataclass(frozen=True, slots=True)
-class Backoff:
+class Backoff(NamedTuple):
     """Exponential backoff: `first` [s], doubled at each attempt up to `longest` [s].
 
     Attributes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -136,7 +135,7 @@ def _region(space: Space, centre: Floats, sides: Floats) -> Space:
         half = 0.5 * side * (axis.high - axis.low)
         half = max(1.0, round(half)) if axis.kind == "integer" else half
         low, high = max(axis.low, middle - half), min(axis.high, middle + half)
-        axes.append(axis if axis.kind == "categorical" else replace(axis, low=low, high=high))
+        axes.append(axis if axis.kind == "categorical" else axis._replace(low=low, high=high))
     return Space(axes)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,8 +219,7 @@ _NEARLY_DIAGONAL: Final = 2.0
 """Root of the condition up to which scales learn at full speed (beta_thresh)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Rates:
+class _Rates(NamedTuple):
     """Learning rates of a part of the covariance."""
 
     path: float  # c_c of the evolution path
@@ -231,8 +229,7 @@ class _Rates:
     """(n,) weights of the ordered samples, negative in the worse half (active CMA)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Root:
+class _Root(NamedTuple):
     """Root of a correlation matrix: (d, d), symmetric; its square is the correlation matrix."""
 
     matrix: Floats

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,7 @@ from gaitswarm.sim.arrays import Floats
 Kind = Literal["continuous", "integer", "categorical"]
 
 
-@dataclass(frozen=True, slots=True)
-class Axis:
+class Axis(NamedTuple):
     """One variable of a search."""
 
     low: float

@@ -121,7 +121,7 @@ class History(Aggregate):
             columns = _select_columns(connection, job_id, iteration, iteration + 1)
             again = _select_reevaluations(connection, job_id, iteration, iteration + 1)
         best = None if columns is None else evaluations_of(columns)[particle]
-        return best and replace(best, reevaluation=again[0][1] if again else None)
+        return best and best._replace(reevaluation=again[0][1] if again else None)
 
     def closest(self, job_id: str) -> tuple[Evaluation, ...]:
         """Return the earliest iteration of least violation; empty if there is none."""

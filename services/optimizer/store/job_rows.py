@@ -6,7 +6,7 @@ import json
 import re
 import secrets
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from datetime import datetime
 from functools import lru_cache
 from typing import Any, Final
@@ -46,10 +46,10 @@ _SAME_NAME: Final = tuple(
 )
 """Columns that are fields of `Job`."""
 
-_PROGRESS: Final = tuple(field.name for field in fields(Progress))
+_PROGRESS: Final = Progress._fields
 """Columns that are fields of `Progress`."""
 
-_REFERENCE: Final = tuple(field.name for field in fields(Reference))
+_REFERENCE: Final = Reference._fields
 """Columns `reference_...` that are fields of `Reference`."""
 
 COLUMNS: Final = tuple(
@@ -149,7 +149,7 @@ def to_job(row: Row) -> Job:
     submitted_iterations = spec.iterations
     if row["budget"] is not None:
         if isinstance(spec, UnreadableSpec):
-            spec = replace(spec, iterations=row["budget"])
+            spec = spec._replace(iterations=row["budget"])
         else:
             spec = spec.with_budget(row["budget"])
     try:

@@ -7,7 +7,6 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
@@ -339,7 +338,7 @@ class Jobs(Aggregate):
     def note_reference(self, job_id: str, reference: Reference) -> None:
         """Store the reference of a job's best design, unless one is stored or the job is gone."""
         unset = sa.update(jobs).where(jobs.c.id == job_id, jobs.c.reference_kind.is_(None))
-        columns = {f"reference_{name}": value for name, value in asdict(reference).items()}
+        columns = {f"reference_{name}": value for name, value in reference._asdict().items()}
         with self._database.write("note_reference") as connection:
             connection.execute(unset.values(columns))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import fields
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -74,7 +73,7 @@ class Recordings(Aggregate):
         """Return a page of recorded walks, newest first. New walks do not shift later pages."""
         limit = checked_limit(limit)
         table = recordings.c
-        columns = (table[field.name] for field in fields(RecordingEntry))
+        columns = (table[name] for name in RecordingEntry._fields)
         query = select(*columns).order_by(table.created_at.desc(), table.id.desc())
         if after is not None:
             place = from_cursor("recording", after, datetime)

@@ -23,7 +23,7 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
     scale,
     subtract,
 )
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 
 InternalState = tuple[Scalar, ...]
 """State that a law carries for one foot from step to step; empty for most laws."""

@@ -43,7 +43,7 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
     subtract,
 )
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS
-from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.bounds import ContactLaw
 from gaitswarm.sim.robot.limbs import Limb, LimbJoint
 
 Scalars = tuple[Scalar, ...]

@@ -6,7 +6,6 @@ One model serves as request body, stored JSON and argument.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
@@ -379,7 +378,7 @@ class JobSpec(WalksSpec):
         if not self.constraints:
             return judged
         infeasible = violations(self.limits(), objectives) > 0.0
-        return replace(judged, fitness=np.where(infeasible, np.inf, judged.fitness))
+        return judged._replace(fitness=np.where(infeasible, np.inf, judged.fitness))
 
     def _unconstrained(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
         logarithms = log_utilities(objectives, failed, self.resolved_preference())

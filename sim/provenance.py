@@ -19,7 +19,7 @@ _ROOT: Final = Path(__file__).parent
 
 _SUFFIXES: Final = (".py", ".c", ".h")
 
-_TABLES: Final = (_ROOT / "presets.toml", _ROOT / "variables.toml")
+_TABLES: Final = (_ROOT / "presets.toml", *_ROOT.rglob("variables.toml"))
 """Data of the simulator; descriptions of robots have digests of their own."""
 
 _NOT_IN_A_CASE: Final = (

@@ -1,7 +1,8 @@
 """Design variables: numbers and choices with bounds and units.
 
-variables.toml declares those of gaits, controllers, robots and worlds, which a job's design space,
-the page's form and the check of design files all use.
+variables.toml declares those of gaits and controllers, robot/variables.toml and
+worlds/variables.toml those of robots and worlds, which a job's design space, the page's form and
+the check of design files all use.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 import operator
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache, lru_cache
+from functools import cache
 from importlib import resources
 from typing import Annotated, Any, Final, Literal
 
@@ -208,21 +209,21 @@ class Variable(BaseModel):
         return self.choices[round(number)]
 
 
-@lru_cache(maxsize=1)
-def _tables() -> Mapping[str, Mapping[str, Any]]:
-    file = resources.files("gaitswarm.sim") / "variables.toml"
+@cache
+def _tables(folder: str) -> Mapping[str, Mapping[str, Any]]:
+    file = resources.files("gaitswarm.sim") / folder / "variables.toml"
     return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 @cache
-def listed_variables(table: str) -> tuple[Variable, ...]:
-    """Return the variables of a table of variables.toml, in its order."""
-    return tuple(Variable(name=name, **fields) for name, fields in _tables()[table].items())
+def listed_variables(table: str, folder: str = "") -> tuple[Variable, ...]:
+    """Return the variables of a table of a folder's variables.toml, in its order."""
+    return tuple(Variable(name=name, **fields) for name, fields in _tables(folder)[table].items())
 
 
-def listed_limits(table: str) -> Mapping[str, tuple[float, float]]:
+def listed_limits(table: str, folder: str = "") -> Mapping[str, tuple[float, float]]:
     """Return the least and largest value of variables that can be simulated, by name."""
-    return {name: (low, high) for name, (low, high) in _tables()["limits"][table].items()}
+    return {name: (low, high) for name, (low, high) in _tables(folder)["limits"][table].items()}
 
 
 def split_name(name: str) -> tuple[str, str | None]:

@@ -19,12 +19,12 @@ from gaitswarm.sim.robot.description import Actuator, Leg, RobotDescription, Tor
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.variables import Variable, listed_variables
 
-_OF_LEGS: Final = listed_variables("robot_leg")
+_OF_LEGS: Final = listed_variables("robot_leg", "robot")
 """Contact parameters; their descriptions end with the name of the leg."""
 
 _DRY_FRICTION: Final = ("coulomb_friction", "stribeck_friction", "load_friction")
 
-CONVENTIONAL_VARIABLES: Final = listed_variables("robot_convention")
+CONVENTIONAL_VARIABLES: Final = listed_variables("robot_convention", "robot")
 """Values for the whole robot that the thesis omits, or gives more than once."""
 
 
@@ -32,10 +32,10 @@ CONVENTIONAL_VARIABLES: Final = listed_variables("robot_convention")
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
     """Return all parameters in the order of table 2.7, with bounds around its values."""
     legs = robot.description.legs
-    efficiency, friction = listed_variables("robot_joint")
+    efficiency, friction = listed_variables("robot_joint", "robot")
     losses = friction if robot.is_torque_controlled else efficiency
     return (
-        *listed_variables("robot"),
+        *listed_variables("robot", "robot"),
         *(_named(losses, joint) for joint in robot.joint_names),
         *(_named(variable, leg.name) for variable in _OF_LEGS for leg in legs),
     )

@@ -15,7 +15,7 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, listed_limits, listed_variables
 
-PERTURBATIONS: Final = listed_variables("world")
+PERTURBATIONS: Final = listed_variables("world", "worlds")
 """Quantities that a world may vary; `default` is the nominal value."""
 
 DRAWN: Final = tuple(v for v in PERTURBATIONS if v.name != "roughness")
@@ -26,7 +26,7 @@ NOMINAL: Final[Mapping[str, float]] = MappingProxyType(
 )
 """Nominal value of each perturbation."""
 
-LIMITS: Final = listed_limits("world")
+LIMITS: Final = listed_limits("world", "worlds")
 """Least and largest value of each that can be simulated; other bounds must lie within."""
 
 

@@ -36,8 +36,8 @@ RARE = (
     "gaitswarm.robots", "gaitswarm.services.optimizer.jobs.designs", "gaitswarm.services.runtime",
     "gaitswarm.services.optimizer.run.runner", "gaitswarm.simulation", "gaitswarm.sim.assembly",
     "gaitswarm.sim.case", "gaitswarm.sim.kernel.sensors", "gaitswarm.sim.kernel.walk",
-    "gaitswarm.sim.robot.description", "gaitswarm.sim.robot.robot", "rich._emoji_codes",
-    "sqlalchemy.dialects.postgresql",
+    "gaitswarm.sim.robot.description", "gaitswarm.sim.robot.robot", "gaitswarm.sim.worlds",
+    "rich._emoji_codes", "sqlalchemy.dialects.postgresql",
     *(
         f"gaitswarm.services.optimizer.jobs.kinds.{other}"
         for other in ("calibration", "certificate", "preferences")

@@ -16,7 +16,6 @@ from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import Data, message_of
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
-from gaitswarm.sim.worlds.perturbations import DRAWN, PERTURBATIONS, sample_worlds
 
 Aggregate = Literal["mean", "quantile", "worst", "cvar"]
 
@@ -86,6 +85,8 @@ class TuningWorlds(Data):
 
     def variables(self) -> tuple[Variable, ...]:
         """Return the perturbations with their bounds. Raises ValueError, not once validated."""
+        from gaitswarm.sim.worlds.perturbations import DRAWN, PERTURBATIONS
+
         perturbations = {variable.name: variable for variable in PERTURBATIONS}
         chosen = DRAWN if self.ranges is None else self.ranges
         variables: dict[str, Variable] = {}
@@ -189,6 +190,8 @@ def mean_of_greatest(ordered: Sequence[float], size: float) -> float:
 
 @lru_cache(maxsize=32)
 def _drawn(worlds: TuningWorlds) -> tuple[tuple[tuple[str, float], ...], ...]:
+    from gaitswarm.sim.worlds.perturbations import sample_worlds
+
     variables = worlds.variables()
     names = [variable.name for variable in variables]
     rows = sample_worlds(worlds.count, worlds.seed, variables).tolist()

@@ -361,10 +361,8 @@ class SessionView(View):
     """Token of the session, and features of the server."""
 
     required: bool = Field(description="Whether this server requires a token.")
-    name: str | None = Field(
-        description="Name of the request's token; null without a valid one.",
-        examples=["ci"],
-    )
+    name: str | None = Field(examples=["ci"])
+    """Name of the request's token; null without a valid one."""
     scope: TokenScope | None = Field(description="Scope of that token; null without one.")
     manual: bool = Field(description="Whether this server has a manual at /manual.")
 

@@ -35,15 +35,11 @@ class HealthView(View):
 class ComponentView(View):
     """Status of a component."""
 
-    name: str = Field(
-        description="`database`; `events` notifies event streams; `runner` claims queued jobs;"
-        " `workers` run their simulations.",
-        examples=["runner"],
-    )
-    status: Status = Field(
-        description="`degraded`: a problem that the server tolerates for a while.",
-        examples=["ok"],
-    )
+    name: str = Field(examples=["runner"])
+    """`database`; `events` notifies event streams; `runner` claims queued jobs; `workers` run their
+    simulations."""
+    status: Status = Field(examples=["ok"])
+    """`degraded`: a problem that the server tolerates for a while."""
     detail: str = Field(default="", description="The problem and its remedy.")
 
 

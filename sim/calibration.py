@@ -107,10 +107,9 @@ class TargetWalk(Data):
     scenarios: tuple[ScenarioChoice, ...] = Field(
         min_length=1,
         max_length=32,
-        description="Names or numbers of presets, or custom scenarios; several for a fitness over"
-        " all of them.",
         examples=[["normal-fast"]],
     )
+    """Names or numbers of presets, or custom scenarios; several for a fitness over all of them."""
 
     @model_validator(mode="after")
     def _can_walk(self) -> TargetWalk:
@@ -133,23 +132,15 @@ class Target(Data):
 
     walk: WalkName
     quantity: QuantityName = Field(description="What was measured.", examples=["energy"])
-    value: FiniteFloat = Field(
-        description="In the quantity's unit; with `relative_to` the ratio to that walk's.",
-        examples=[41.96],
-    )
-    tolerance: float = Field(
-        gt=0.0,
-        le=1e6,
-        description="Deviation that counts as one. Relative, 0.2 for a fifth, except for"
-        " height_loss, which may have either sign: in metres.",
-        examples=[0.2],
-    )
-    relative_to: WalkName | None = Field(
-        default=None, description="Another walk, if the value is the ratio to its quantity."
-    )
-    use: Literal["fit", "predict"] = Field(
-        default="fit", description="Whether it is fitted, or only predicted and reported."
-    )
+    value: FiniteFloat = Field(examples=[41.96])
+    """In the quantity's unit; with `relative_to` the ratio to that walk's."""
+    tolerance: float = Field(gt=0.0, le=1e6, examples=[0.2])
+    """Deviation that counts as one. Relative, 0.2 for a fifth, except for height_loss, which may
+    have either sign: in metres."""
+    relative_to: WalkName | None = None
+    """Another walk, if the value is the ratio to its quantity."""
+    use: Literal["fit", "predict"] = "fit"
+    """Whether it is fitted, or only predicted and reported."""
 
     @model_validator(mode="after")
     def _has_a_sense(self) -> Target:

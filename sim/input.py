@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
+from itertools import pairwise
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
@@ -34,7 +39,55 @@ _KEY: Final = "[key]"
 """Appended by pydantic if the key of a dictionary is wrong, not its value."""
 
 
-class Data(BaseModel):
+@cache
+def field_docstrings(module: str) -> Mapping[str, Mapping[str, str]]:
+    """Docstrings below the fields of a module's classes, each in one line."""
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except (KeyError, OSError, TypeError):
+        # There is no file, as in an interpreter.
+        return {}
+    return {
+        model.name: {
+            field.target.id: " ".join(text.value.value.split())
+            for field, text in pairwise(model.body)
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+            if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+            if isinstance(text.value.value, str)
+        }
+        for model in ast.parse(source).body
+        if isinstance(model, ast.ClassDef)
+    }
+
+
+class Described(BaseModel):
+    """A model whose longer descriptions of fields are docstrings below them.
+
+    They are read for JSON schemas alone: Pydantic would read them at every start.
+    """
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        document = handler(schema)
+        properties = handler.resolve_ref_schema(document)["properties"]
+        for name, text in cls.descriptions().items():
+            if name in properties:
+                properties[name].setdefault("description", text)
+        return document
+
+    @classmethod
+    def descriptions(cls) -> dict[str, str]:
+        """Descriptions of the fields, by name."""
+        texts: dict[str, str] = {}
+        for base in reversed(cls.__mro__[: cls.__mro__.index(Described)]):
+            texts |= field_docstrings(base.__module__).get(base.__name__, {})
+        given = cls.model_fields.items()
+        return texts | {name: field.description for name, field in given if field.description}
+
+
+class Data(Described):
     """Immutable data without unknown fields or infinities."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
@@ -186,8 +239,8 @@ def _number(value: object) -> object:
 def description_of(model: Any, location: Sequence[str | int]) -> str | None:
     """Return the description of the field at a location in a model's document, if it has one."""
     name = str(location[-1]) if location else ""
-    fields = (node.model_fields.get(name) for node in _containing(model, location))
-    return next((field.description for field in fields if field is not None), None)
+    models = (node for node in _containing(model, location) if issubclass(node, Described))
+    return next((m.descriptions().get(name) for m in models if name in m.model_fields), None)
 
 
 def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:

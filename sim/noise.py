@@ -23,13 +23,10 @@ class LinkNoise(Data):
     """
 
     link: Literal[1, 2, 3] = Field(description="Links disturbed: 1 coxa, 2 femur, 3 tibia.")
-    deviation: float = Field(
-        gt=0.0, le=100.0, description="Standard deviation [N m], or of an angle [rad]."
-    )
-    kind: Literal["torque", "angle"] = Field(
-        default="torque",
-        description="A torque on the links, or an angle between gearheads and links.",
-    )
+    deviation: float = Field(gt=0.0, le=100.0)
+    """Standard deviation [N m], or of an angle [rad]."""
+    kind: Literal["torque", "angle"] = "torque"
+    """A torque on the links, or an angle between gearheads and links."""
     seed: int = Field(default=1, ge=0, lt=2**63, description="Seed of the noise.")
 
     @model_validator(mode="after")

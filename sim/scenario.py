@@ -86,68 +86,31 @@ class Scenario(Data):
     """
 
     name: ScenarioName
-    cycle_time: float = Field(
-        ge=0.2, le=10.0, description="Duration of a walking cycle [s].", examples=[1.5]
-    )
-    radius: float = Field(
-        gt=0.0,
-        le=10.0,
-        description="Lateral distance of the feet from the body's long axis [m].",
-        examples=[0.16],
-    )
-    hip_height: float = Field(
-        gt=0.0,
-        le=10.0,
-        description="Height of the coxa axes above the ground, the thesis's withers [m].",
-        examples=[0.15],
-    )
-    load: float = Field(
-        default=0.0, ge=0.0, le=50.0, description="Extra mass carried on the body [kg]."
-    )
-    direction: Literal["forward", "backward"] = Field(
-        default="forward",
-        description="Direction of the walk; distance and speed count along it.",
-    )
-    turn: float = Field(
-        default=0.0,
-        ge=-1.0,
-        le=1.0,
-        description="Share by which the inner legs' stride is shortened [1]; right turns positive.",
-    )
-    turn_mode: Literal["inner", "both"] = Field(
-        default="inner",
-        description="Whether a turn only shortens the inner legs' stride, or also lengthens that of"
-        " the outer legs by the same share.",
-    )
-    slope: float = Field(
-        default=0.0,
-        ge=-45.0,
-        le=45.0,
-        description="Inclination of the ground [deg], up positive.",
-    )
-    slope_direction: float = Field(
-        default=0.0,
-        ge=-180.0,
-        le=180.0,
-        description="Direction in which the ground rises, from straight ahead to the left [deg].",
-    )
-    terrain: Terrain = Field(
-        default=PLANE,
-        description="Shape of the ground, which controller and gait do not know.",
-        examples=[{"kind": "rough", "amplitude": 0.01}],
-    )
-    stride: float = Field(
-        default=0.06,
-        gt=0.0,
-        le=10.0,
-        description="Length of a foot's stroke on the ground [m].",
-    )
-    height: float = Field(
-        default=0.043,
-        ge=0.0,
-        le=5.0,
-        description="Height of the swing [m].",
-    )
+    cycle_time: float = Field(ge=0.2, le=10.0, examples=[1.5])
+    """Duration of a walking cycle [s]."""
+    radius: float = Field(gt=0.0, le=10.0, examples=[0.16])
+    """Lateral distance of the feet from the body's long axis [m]."""
+    hip_height: float = Field(gt=0.0, le=10.0, examples=[0.15])
+    """Height of the coxa axes above the ground, the thesis's withers [m]."""
+    load: float = Field(default=0.0, ge=0.0, le=50.0)
+    """Extra mass carried on the body [kg]."""
+    direction: Literal["forward", "backward"] = "forward"
+    """Direction of the walk; distance and speed count along it."""
+    turn: float = Field(default=0.0, ge=-1.0, le=1.0)
+    """Share by which the inner legs' stride is shortened [1]; right turns positive."""
+    turn_mode: Literal["inner", "both"] = "inner"
+    """Whether a turn only shortens the inner legs' stride, or also lengthens that of the outer legs
+    by the same share."""
+    slope: float = Field(default=0.0, ge=-45.0, le=45.0)
+    """Inclination of the ground [deg], up positive."""
+    slope_direction: float = Field(default=0.0, ge=-180.0, le=180.0)
+    """Direction in which the ground rises, from straight ahead to the left [deg]."""
+    terrain: Terrain = Field(default=PLANE, examples=[{"kind": "rough", "amplitude": 0.01}])
+    """Shape of the ground, which controller and gait do not know."""
+    stride: float = Field(default=0.06, gt=0.0, le=10.0)
+    """Length of a foot's stroke on the ground [m]."""
+    height: float = Field(default=0.043, ge=0.0, le=5.0)
+    """Height of the swing [m]."""
     duty_factor: float = Field(
         default=0.56,
         ge=0.1,
@@ -155,20 +118,13 @@ class Scenario(Data):
         description="Share of the cycle of the phase selected by `duty_phase`; the default is"
         f" {', '.join(f'{share:g} in a {gait}' for gait, share in USUAL_SUPPORT.items())} [1].",
     )
-    duty_phase: Literal["support", "swing"] = Field(
-        default="support", description="Phase to which `duty_factor` applies."
-    )
-    start_phase: float = Field(
-        default=0.0,
-        ge=0.0,
-        lt=1.0,
-        description="Share of the cycle at which the gait starts [1]; 0.5 swaps the tripods.",
-    )
-    gait: GaitName = Field(
-        default="own",
-        description="Order of the legs' steps: own is the order in the robot's description; see"
-        " `gaitswarm gaits`.",
-    )
+    duty_phase: Literal["support", "swing"] = "support"
+    """Phase to which `duty_factor` applies."""
+    start_phase: float = Field(default=0.0, ge=0.0, lt=1.0)
+    """Share of the cycle at which the gait starts [1]; 0.5 swaps the tripods."""
+    gait: GaitName = "own"
+    """Order of the legs' steps: own is the order in the robot's description; see `gaitswarm
+    gaits`."""
     phases: (
         Annotated[dict[LegName, Phase], Field(max_length=32), AfterValidator(ValuesByName)] | None
     ) = Field(
@@ -186,44 +142,22 @@ class Scenario(Data):
         " such as `stride[front]`; they override the scenario's.",
         examples=[{"stride[front]": 0.05, "height[hind]": 0.03}],
     )
-    fir_ms: int = Field(
-        default=12, ge=0, le=1000, description="Length of the low-pass FIR filter [ms]."
-    )
-    fir_window: Literal["moving_average", "hamming"] = Field(
-        default="moving_average",
-        description="Coefficients of the FIR filter: all equal, or those of Matlab's fir1.",
-    )
-    trajectory_rate: float = Field(
-        default=500.0,
-        ge=1.0,
-        le=500.0,
-        description="Rate at which the desired angles are updated [Hz].",
-    )
-    curve: CurveName = Field(
-        default="half_ellipse",
-        description="Shape of the swing; the spline is that of the drive of 2011 (appendix .2.1).",
-    )
-    sway_lateral: float = Field(
-        default=0.0,
-        ge=-0.3,
-        le=0.3,
-        description="Amplitude of the body's sway to the left and right, once per cycle [m].",
-    )
-    sway_longitudinal: float = Field(
-        default=0.0,
-        ge=-0.3,
-        le=0.3,
-        description="Amplitude of the body's sway along the walk, twice per cycle [m].",
-    )
-    sway_phase: float = Field(
-        default=0.5,
-        ge=0.0,
-        lt=1.0,
-        description="Share of the gait's cycle at which the body is furthest to the left [1].",
-    )
-    cycles: float = Field(
-        default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
-    )
+    fir_ms: int = Field(default=12, ge=0, le=1000)
+    """Length of the low-pass FIR filter [ms]."""
+    fir_window: Literal["moving_average", "hamming"] = "moving_average"
+    """Coefficients of the FIR filter: all equal, or those of Matlab's fir1."""
+    trajectory_rate: float = Field(default=500.0, ge=1.0, le=500.0)
+    """Rate at which the desired angles are updated [Hz]."""
+    curve: CurveName = "half_ellipse"
+    """Shape of the swing; the spline is that of the drive of 2011 (appendix .2.1)."""
+    sway_lateral: float = Field(default=0.0, ge=-0.3, le=0.3)
+    """Amplitude of the body's sway to the left and right, once per cycle [m]."""
+    sway_longitudinal: float = Field(default=0.0, ge=-0.3, le=0.3)
+    """Amplitude of the body's sway along the walk, twice per cycle [m]."""
+    sway_phase: float = Field(default=0.5, ge=0.0, lt=1.0)
+    """Share of the gait's cycle at which the body is furthest to the left [1]."""
+    cycles: float = Field(default=3.0, ge=1.0, le=100.0)
+    """Number of cycles to walk [1]."""
     stuck_leg: str | None = Field(
         default=None,
         min_length=1,
@@ -231,31 +165,15 @@ class Scenario(Data):
         description="Name of the leg whose joints are jammed at their start angles; default: none.",
         examples=["right_middle"],
     )
-    drop: float = Field(
-        default=0.0,
-        ge=0.0,
-        le=0.5,
-        description="Height above its stance from which the robot is dropped at the start [m].",
-    )
+    drop: float = Field(default=0.0, ge=0.0, le=0.5)
+    """Height above its stance from which the robot is dropped at the start [m]."""
 
-    shove: float = Field(
-        default=0.0,
-        ge=0.0,
-        le=100.0,
-        description="Horizontal impulse on the body in mid-walk, a constant force for 0.1 s [N s].",
-    )
-    shove_direction: float = Field(
-        default=90.0,
-        ge=-180.0,
-        le=180.0,
-        description="Direction of the shove, from straight ahead at the start to the left [deg].",
-    )
-    shove_at: float = Field(
-        default=0.5,
-        ge=0.0,
-        lt=1.0,
-        description="Share of the walk at which the shove starts, 0.1 s before the end at latest.",
-    )
+    shove: float = Field(default=0.0, ge=0.0, le=100.0)
+    """Horizontal impulse on the body in mid-walk, a constant force for 0.1 s [N s]."""
+    shove_direction: float = Field(default=90.0, ge=-180.0, le=180.0)
+    """Direction of the shove, from straight ahead at the start to the left [deg]."""
+    shove_at: float = Field(default=0.5, ge=0.0, lt=1.0)
+    """Share of the walk at which the shove starts, 0.1 s before the end at latest."""
 
     @model_validator(mode="before")
     @classmethod

@@ -42,15 +42,10 @@ class Plane(Data):
 
 class _Edges(Data):
     height: float = Field(gt=0.0, le=0.5, description="Height of a step [m].", examples=[0.02])
-    depth: float = Field(
-        default=0.25, ge=0.02, le=5.0, description="Length of a step along the walk [m]."
-    )
-    start: float = Field(
-        default=0.3,
-        ge=0.0,
-        le=10.0,
-        description="Distance of the first edge ahead of the body's centre at the start [m].",
-    )
+    depth: float = Field(default=0.25, ge=0.02, le=5.0)
+    """Length of a step along the walk [m]."""
+    start: float = Field(default=0.3, ge=0.0, le=10.0)
+    """Distance of the first edge ahead of the body's centre at the start [m]."""
 
 
 class Steps(_Edges):
@@ -69,18 +64,10 @@ class Rough(Data):
     """Smooth random bumps that repeat after 64 correlation lengths."""
 
     kind: Literal["rough"]
-    amplitude: float = Field(
-        ge=0.0,
-        le=0.5,
-        description="Largest height and depth against the mean plane [m].",
-        examples=[0.01],
-    )
-    correlation_length: float = Field(
-        default=0.1,
-        ge=0.02,
-        le=10.0,
-        description="Distance between independent heights [m].",
-    )
+    amplitude: float = Field(ge=0.0, le=0.5, examples=[0.01])
+    """Largest height and depth against the mean plane [m]."""
+    correlation_length: float = Field(default=0.1, ge=0.02, le=10.0)
+    """Distance between independent heights [m]."""
     seed: int = Field(default=1, ge=0, lt=2**53, description="Seed of the heights.")
 
 

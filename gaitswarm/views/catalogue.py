@@ -54,10 +54,8 @@ class RobotView(View):
 class ScenarioView(Scenario):
     """A preset walking scenario; 1 to 6 are those of thesis table 4.2."""
 
-    number: int = Field(
-        description="Its number, 1 to 6 as in table 4.2; a job may name a scenario by it.",
-        examples=[1],
-    )
+    number: int = Field(examples=[1])
+    """Its number, 1 to 6 as in table 4.2; a job may name a scenario by it."""
     simulated_seconds: float = Field(description="Length of the walk [s].", examples=[4.5])
 
 

@@ -186,9 +186,8 @@ class JobSummaryView(View):
     priority: int = Field(default=0, examples=[0])
     """Priority: the highest one runs first; each step doubles the share of workers [1]."""
     created_at: datetime = Field(description="When it was submitted, UTC.")
-    updated_at: datetime = Field(
-        description="When its state, progress or waiting last changed, UTC."
-    )
+    updated_at: datetime
+    """When its state, progress or waiting last changed, UTC."""
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(

@@ -9,8 +9,8 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from gaitswarm.services.optimizer.views import field_docstrings
 from gaitswarm.settings import Settings, variable_of
+from gaitswarm.sim.input import Described, field_docstrings
 from scripts.manual.tables import code, head, kind_of, row
 
 
@@ -24,8 +24,9 @@ def models(model: type[BaseModel]) -> Iterator[str]:
     for one in found:
         yield f"\n## {one.__name__}\n\n{(one.__doc__ or '').strip().splitlines()[0]}\n"
         yield from head("field", "type", "default", "meaning")
+        described = one.descriptions() if issubclass(one, Described) else {}
         for name, field in one.model_fields.items():
-            yield _row(name, field)
+            yield _row(name, field, described.get(name, ""))
             found += [inner for inner in _inner(field.annotation) if inner not in found]
 
 
@@ -51,14 +52,14 @@ def _variable(default: object) -> str:
     return code("" if default is None else default)
 
 
-def _row(name: str, field: FieldInfo) -> str:
+def _row(name: str, field: FieldInfo, described: str) -> str:
     value = None if field.is_required() else field.get_default(call_default_factory=True)
     kind = getattr(field.annotation, "__name__", None) if not get_args(field.annotation) else None
     shown = kind or str(field.annotation).replace("typing.", "")
     for module in ("gaitswarm.sim.robot.description.", "collections.abc."):
         shown = shown.replace(module, "")
     default = code("" if value is None else value)
-    return row([code(name), code(shown), default, field.description or ""])
+    return row([code(name), code(shown), default, field.description or described])
 
 
 def _inner(annotation: Any) -> Iterator[type[BaseModel]]:

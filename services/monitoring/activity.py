@@ -35,21 +35,18 @@ class IterationSpanView(View):
     iteration: IterationIndex
     begun_at: datetime = Field(description="When it was sent to the workers, UTC.")
     designs: int = Field(description="Designs simulated for it [1].", examples=[25])
-    seconds: float | None = Field(
-        description="Duration [s]; null while in progress.", examples=[0.61]
-    )
-    error: str | None = Field(
-        description="Why it has no result; null for a result or while in progress."
-    )
+    seconds: float | None = Field(examples=[0.61])
+    """Duration [s]; null while in progress."""
+    error: str | None
+    """Why it has no result; null for a result or while in progress."""
 
 
 class TaskSpanView(View):
     """A task: simulations of an iteration that a worker ran together."""
 
     iteration: IterationIndex
-    worker: str = Field(
-        description="Name of the worker's machine; empty without an answer.", examples=["node-1"]
-    )
+    worker: str = Field(examples=["node-1"])
+    """Name of the worker's machine; empty without an answer."""
     begun_at: datetime = Field(description="When the worker received it, UTC.")
     seconds: float = Field(description="From then to its answer [s].", examples=[0.52])
     compute_seconds: float = Field(description="Computing time of these [s].", examples=[0.5])
@@ -60,17 +57,15 @@ class TaskSpanView(View):
 class WorkerHealthView(View):
     """A machine that has run tasks of the job."""
 
-    name: str = Field(
-        description="Name of the machine; empty for tasks without an answer.", examples=["node-1"]
-    )
+    name: str = Field(examples=["node-1"])
+    """Name of the machine; empty for tasks without an answer."""
     tasks: int = Field(description="Ended tasks [1].", examples=[120])
     walks: int = Field(description="Simulations with a result [1].", examples=[5760])
     failures: int = Field(description="Tasks without a result [1].", examples=[0])
     compute_seconds: float = Field(description="Computing time [s].", examples=[61.2])
     last_seen_at: datetime = Field(description="When it answered last, UTC.")
-    error: str | None = Field(
-        description="Of the last task without a result; null if all have one."
-    )
+    error: str | None
+    """Of the last task without a result; null if all have one."""
 
 
 class MessageView(View):

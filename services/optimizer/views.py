@@ -2,68 +2,28 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import math
 import struct
-import sys
-from collections.abc import Mapping
-from functools import cache
-from itertools import pairwise
 from typing import Annotated, Any, Final, Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from gaitswarm.sim.input import Described
 
 T = TypeVar("T")
 
 StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled", "struck"]
 
 
-@cache
-def field_docstrings(module: str) -> Mapping[str, Mapping[str, str]]:
-    """Docstrings below the fields of a module's classes, each in one line."""
-    return {
-        model.name: {
-            field.target.id: " ".join(text.value.value.split())
-            for field, text in pairwise(model.body)
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-            if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
-            if isinstance(text.value.value, str)
-        }
-        for model in ast.parse(inspect.getsource(sys.modules[module])).body
-        if isinstance(model, ast.ClassDef)
-    }
-
-
-class _Described(BaseModel):
-    """A model whose longer descriptions of fields are docstrings below them.
-
-    They are read for JSON schemas alone: Pydantic would read them at every start.
-    """
-
-    @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        document = handler(schema)
-        properties = handler.resolve_ref_schema(document)["properties"]
-        for base in cls.__mro__[: cls.__mro__.index(_Described)]:
-            for name, text in field_docstrings(base.__module__).get(base.__name__, {}).items():
-                properties[name].setdefault("description", text)
-        return document
-
-
-class View(_Described):
+class View(Described):
     """A domain object as JSON, in which a number that is not finite is null."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", from_attributes=True, defer_build=True)
 
 
-class Request(_Described):
+class Request(Described):
     """The body of a request."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -40,9 +40,8 @@ FASTEST_INNER_RATE: Final = 40_000
 class Motor(Data):
     """A DC motor (thesis 2.2.5)."""
 
-    torque_constant: Number = Field(
-        gt=0.0, description="K_M [N m/A]; also the back-EMF constant [V s/rad]"
-    )
+    torque_constant: Number = Field(gt=0.0)
+    """K_M [N m/A]; also the back-EMF constant [V s/rad]"""
     resistance: Number = Field(gt=0.0, description="R [ohm]")
     inductance: Number = Field(gt=0.0, description="L [H]")
     rotor_inertia: Number = Field(gt=0.0, description="J_M [kg m2]")
@@ -64,28 +63,16 @@ class DryFriction(Data):
     link_load_square tau_L^2 where |tau_L| < |tau_M|, else motor_load_square tau_M^2.
     """
 
-    coulomb_friction: Number = Field(
-        default=0.0, ge=0.0, description="part independent of speed and load [N m]"
-    )
-    stribeck_friction: Number = Field(
-        default=0.0, ge=0.0, description="additional part at rest, halved at stribeck_speed [N m]"
-    )
-    stribeck_speed: Number = Field(
-        default=0.1, gt=0.0, description="speed at which stribeck_friction is halved [rad/s]"
-    )
-    load_friction: Number = Field(
-        default=0.0,
-        ge=0.0,
-        lt=1.0,
-        description="part of the sum of the torques on both sides of the gear [1]",
-    )
-    stribeck_exponent: Number = Field(
-        default=0.0,
-        ge=0.0,
-        le=20.0,
-        exclude_if=operator.not_,
-        description="of an exponential decay with speed; 0 for Hess and Soom's curve [1]",
-    )
+    coulomb_friction: Number = Field(default=0.0, ge=0.0)
+    """part independent of speed and load [N m]"""
+    stribeck_friction: Number = Field(default=0.0, ge=0.0)
+    """additional part at rest, halved at stribeck_speed [N m]"""
+    stribeck_speed: Number = Field(default=0.1, gt=0.0)
+    """speed at which stribeck_friction is halved [rad/s]"""
+    load_friction: Number = Field(default=0.0, ge=0.0, lt=1.0)
+    """part of the sum of the torques on both sides of the gear [1]"""
+    stribeck_exponent: Number = Field(default=0.0, ge=0.0, le=20.0, exclude_if=operator.not_)
+    """of an exponential decay with speed; 0 for Hess and Soom's curve [1]"""
     motor_load_friction: Number = _share("further part of the motor's torque [1]")
     link_load_friction: Number = _share("further part of the torque passed to the link [1]")
     stribeck_motor_load: Number = _share("part of the motor's torque at rest [1]")
@@ -114,54 +101,37 @@ class Gearhead(DryFriction):
 class Shaft(Data):
     """Backlash between an actuator and its link."""
 
-    backlash: Number = Field(
-        default=0.0,
-        ge=0.0,
-        le=0.5,
-        description="backlash between gearhead and link, end to end (thesis: gearlash) [rad]",
-    )
-    shaft_stiffness: Number = Field(
-        default=500.0,
-        gt=0.0,
-        description="stiffness once backlash is closed; only with backlash [N m/rad]",
-    )
-    shaft_damping: Number = Field(
-        default=0.5,
-        ge=0.0,
-        description="damping once backlash is closed; only with backlash [N m s/rad]",
-    )
+    backlash: Number = Field(default=0.0, ge=0.0, le=0.5)
+    """backlash between gearhead and link, end to end (thesis: gearlash) [rad]"""
+    shaft_stiffness: Number = Field(default=500.0, gt=0.0)
+    """stiffness once backlash is closed; only with backlash [N m/rad]"""
+    shaft_damping: Number = Field(default=0.5, ge=0.0)
+    """damping once backlash is closed; only with backlash [N m s/rad]"""
 
 
 class PositionLoop(Data):
     """Position control in a servo's firmware: duty = P position_gain error, with a dead band."""
 
-    position_gain: Number = Field(
-        gt=0.0, description="duty of the PWM per error and unit of P [1/rad]"
-    )
+    position_gain: Number = Field(gt=0.0)
+    """duty of the PWM per error and unit of P [1/rad]"""
     duty_limit: Number = Field(default=1.0, gt=0.0, le=1.0, description="largest duty [1]")
-    dead_band: Number = Field(
-        default=0.0, ge=0.0, le=0.5, description="error up to which the motor is off [rad]"
-    )
-    default_p: Number = Field(
-        gt=0.0, le=LARGEST_OUTPUT, description="P of the firmware [units of its register]"
-    )
+    dead_band: Number = Field(default=0.0, ge=0.0, le=0.5)
+    """error up to which the motor is off [rad]"""
+    default_p: Number = Field(gt=0.0, le=LARGEST_OUTPUT)
+    """P of the firmware [units of its register]"""
     tunable: bool = Field(default=True, description="whether P can be set")
 
 
 class Actuator(Shaft):
     """DC motor, gearhead and bevel gear of one joint."""
 
-    kind: Literal["dc"] = Field(
-        default="dc", exclude_if="dc".__eq__, description="dc: a motor's voltage is controlled"
-    )
+    kind: Literal["dc"] = Field(default="dc", exclude_if="dc".__eq__)
+    """dc: a motor's voltage is controlled"""
     motor: PartName
     gearhead: PartName
     bevel: Number = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
-    servo: PositionLoop | None = Field(
-        default=None,
-        exclude_if=operator.not_,
-        description="position control of a servo; of all actuators of the legs or of none",
-    )
+    servo: PositionLoop | None = Field(default=None, exclude_if=operator.not_)
+    """position control of a servo; of all actuators of the legs or of none"""
 
 
 class TorqueActuator(Shaft, DryFriction):
@@ -174,26 +144,18 @@ class TorqueActuator(Shaft, DryFriction):
 
     kind: Literal["torque"] = Field(description="torque: the actuator's torque is controlled")
     gear_ratio: Number = Field(gt=0.0, description="turns of the motor per turn of the joint [1]")
-    torque_constant: Number = Field(
-        gt=0.0, description="k_t of the motor [N m/A]; also the back-EMF constant [V s/rad]"
-    )
+    torque_constant: Number = Field(gt=0.0)
+    """k_t of the motor [N m/A]; also the back-EMF constant [V s/rad]"""
     resistance: Number = Field(gt=0.0, description="R, which heats with R I^2 [ohm]")
     rotor_inertia: Number = Field(gt=0.0, description="J_M of the rotor [kg m2]")
-    torque_limit: Number = Field(
-        gt=0.0, description="largest torque at the joint, full scale of a controller's output [N m]"
-    )
-    speed_limit: Number | None = Field(
-        default=None,
-        gt=0.0,
-        description="speed of the joint at which torque along the motion reaches zero [rad/s];"
-        " default: limited by the battery voltage, R I + k_e omega <= U",
-    )
-    knee_speed: Number | None = Field(
-        default=None,
-        ge=0.0,
-        description="speed of the joint up to which torque_limit is available; beyond it torque"
-        " falls to zero at speed_limit [rad/s]",
-    )
+    torque_limit: Number = Field(gt=0.0)
+    """largest torque at the joint, full scale of a controller's output [N m]"""
+    speed_limit: Number | None = Field(default=None, gt=0.0)
+    """speed of the joint at which torque along the motion reaches zero [rad/s]; default: limited by
+    the battery voltage, R I + k_e omega <= U"""
+    knee_speed: Number | None = Field(default=None, ge=0.0)
+    """speed of the joint up to which torque_limit is available; beyond it torque falls to zero at
+    speed_limit [rad/s]"""
     viscous_friction: Number = Field(default=0.0, ge=0.0, description="at the joint [N m s/rad]")
 
     @model_validator(mode="after")
@@ -251,12 +213,8 @@ AnyActuator = Annotated[
 class TorqueCommand(Data):
     """Command interface of torque-controlled actuators."""
 
-    counts: int = Field(
-        default=2047,
-        gt=0,
-        le=LARGEST_OUTPUT,
-        description="full scale of a controller's output, equal to torque_limit [counts]",
-    )
+    counts: int = Field(default=2047, gt=0, le=LARGEST_OUTPUT)
+    """full scale of a controller's output, equal to torque_limit [counts]"""
     step: int = Field(default=1, ge=1, le=LARGEST_OUTPUT, description="resolution [counts]")
     rate: int = Field(
         default=1000,
@@ -284,17 +242,11 @@ class Supply(Data):
 
     voltage: Number = Field(gt=0.0, description="open-circuit voltage [V]")
     resistance: Number = Field(ge=0.0, description="internal resistance [ohm]")
-    nominal_voltage: Number | None = Field(
-        default=None,
-        gt=0.0,
-        exclude_if=operator.not_,
-        description="supply voltage at which the PWM's full scale applies [V]; DC motors only",
-    )
-    energy: EnergyConvention = Field(
-        default="signed",
-        description="electrical power of each motor that counts as spent and loads the battery:"
-        " signed (braking returns energy), positive (braking energy is lost) or absolute",
-    )
+    nominal_voltage: Number | None = Field(default=None, gt=0.0, exclude_if=operator.not_)
+    """supply voltage at which the PWM's full scale applies [V]; DC motors only"""
+    energy: EnergyConvention = "signed"
+    """electrical power of each motor that counts as spent and loads the battery: signed (braking
+    returns energy), positive (braking energy is lost) or absolute"""
 
 
 class Pwm(Data):
@@ -308,25 +260,17 @@ class Pwm(Data):
 class Sensors(Data):
     """Coded readings (thesis table 4.4): integers, in steps of the converter's resolution."""
 
-    angle_counts: Number = Field(
-        gt=0.0, le=MOST_COUNTS, description="code of one radian [counts/rad]"
-    )
-    angle_step: int = Field(
-        default=1, ge=1, le=MOST_COUNTS, description="encoder resolution [counts]"
-    )
-    current_counts: Number = Field(
-        gt=0.0, le=MOST_COUNTS, description="code of one ampere [counts/A]"
-    )
-    current_step: int = Field(
-        default=16, ge=1, le=MOST_COUNTS, description="resolution of the ADC [counts]"
-    )
-    current_filter: Number = Field(
-        default=0.0,
-        ge=0.0,
-        le=1.0,
-        description="time constant of the first-order low-pass of the absolute current before the"
-        " ADC; 0 for none [s]",
-    )
+    angle_counts: Number = Field(gt=0.0, le=MOST_COUNTS)
+    """code of one radian [counts/rad]"""
+    angle_step: int = Field(default=1, ge=1, le=MOST_COUNTS)
+    """encoder resolution [counts]"""
+    current_counts: Number = Field(gt=0.0, le=MOST_COUNTS)
+    """code of one ampere [counts/A]"""
+    current_step: int = Field(default=16, ge=1, le=MOST_COUNTS)
+    """resolution of the ADC [counts]"""
+    current_filter: Number = Field(default=0.0, ge=0.0, le=1.0)
+    """time constant of the first-order low-pass of the absolute current before the ADC; 0 for none
+    [s]"""
 
 
 class Contact(Data):
@@ -336,18 +280,14 @@ class Contact(Data):
     damping: Number = Field(ge=0.0, description="c [N s/m]")
     sole: Number = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
     friction: Number = Field(ge=0.0, description="mu [1]")
-    slip_velocity: Number = Field(
-        gt=0.0, description="linear_zone, dead_zone: v_lin, full friction from this speed [m/s]"
-    )
-    stick_velocity: Number = Field(
-        default=0.005, gt=0.0, description="karnopp, dead_zone: v_d, no friction below [m/s]"
-    )
-    stick_stiffness: Number = Field(
-        default=10000.0, gt=0.0, description="stick: stiffness of the sole along the ground [N/m]"
-    )
-    stick_damping: Number = Field(
-        default=100.0, ge=0.0, description="stick: damping of the sole along the ground [N s/m]"
-    )
+    slip_velocity: Number = Field(gt=0.0)
+    """linear_zone, dead_zone: v_lin, full friction from this speed [m/s]"""
+    stick_velocity: Number = Field(default=0.005, gt=0.0)
+    """karnopp, dead_zone: v_d, no friction below [m/s]"""
+    stick_stiffness: Number = Field(default=10000.0, gt=0.0)
+    """stick: stiffness of the sole along the ground [N/m]"""
+    stick_damping: Number = Field(default=100.0, ge=0.0)
+    """stick: damping of the sole along the ground [N s/m]"""
 
 
 GroupName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}$")]
@@ -361,9 +301,8 @@ class Leg(Data):
 
     name: Annotated[PartName, Field(max_length=LONGEST_LEG_NAME)]
     phase: Number = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")
-    actuators: tuple[PartName, PartName, PartName] = Field(
-        description="actuators of coxa, femur, tibia"
-    )
+    actuators: tuple[PartName, PartName, PartName]
+    """actuators of coxa, femur, tibia"""
     own_joints: tuple[PartName, PartName, PartName] | None = Field(
         default=None,
         alias="joints",
@@ -376,12 +315,9 @@ class Leg(Data):
         exclude_if=operator.not_,
         description="link or fixed joint at the leg's end; default `<name>_foot`",
     )
-    stance: tuple[Number, Number, Number] | None = Field(
-        default=None,
-        exclude_if=operator.not_,
-        description="joint angles of the leg's stance, for which its gait is planned [rad]; default"
-        " for legs with all frames parallel to the body's: knee up",
-    )
+    stance: tuple[Number, Number, Number] | None = Field(default=None, exclude_if=operator.not_)
+    """joint angles of the leg's stance, for which its gait is planned [rad]; default for legs with
+    all frames parallel to the body's: knee up"""
     contact: Contact | None = Field(default=None, description="contact parameters of this foot")
 
     @property
@@ -407,20 +343,13 @@ class RobotDescription(Data):
     description: Lines = Field(default="", max_length=2000)
     load_height: Number = Field(description="height of a load above the body's centre [m]")
     contact_law: ContactLaw = Field(default="linear_zone", description="friction law of all feet")
-    planned_soles: PlannedSoles = Field(
-        default="nominal",
-        description="sole lengths that the gait assumes: nominal, the common contact's, since a"
-        " controller does not know the true ones; or own, each leg's",
-    )
-    body_mass: Number | None = Field(
-        default=None,
-        gt=0.0,
-        description="mass that replaces the body's in the URDF and scales its inertia [kg]",
-    )
-    elastic_shafts: bool = Field(
-        default=False,
-        description="model elastic shafts between motors and links, even without backlash",
-    )
+    planned_soles: PlannedSoles = "nominal"
+    """sole lengths that the gait assumes: nominal, the common contact's, since a controller does
+    not know the true ones; or own, each leg's"""
+    body_mass: Number | None = Field(default=None, gt=0.0)
+    """mass that replaces the body's in the URDF and scales its inertia [kg]"""
+    elastic_shafts: bool = False
+    """model elastic shafts between motors and links, even without backlash"""
     servo_rate: int = Field(
         default=1000,
         ge=CONTROL_RATE,
@@ -433,16 +362,10 @@ class RobotDescription(Data):
     gearheads: dict[PartName, Gearhead] = Field(default={}, description="likewise")
     actuators: dict[PartName, AnyActuator]
     supply: Supply
-    pwm: Pwm | None = Field(
-        default=None,
-        exclude_if=operator.not_,
-        description="required for DC motors, and only for them",
-    )
-    torque_command: TorqueCommand | None = Field(
-        default=None,
-        exclude_if=operator.not_,
-        description="only for torque-controlled actuators; default: the defaults of its fields",
-    )
+    pwm: Pwm | None = Field(default=None, exclude_if=operator.not_)
+    """required for DC motors, and only for them"""
+    torque_command: TorqueCommand | None = Field(default=None, exclude_if=operator.not_)
+    """only for torque-controlled actuators; default: the defaults of its fields"""
     sensors: Sensors
     contact: Contact
     legs: tuple[Leg, ...] = Field(min_length=2, max_length=MOST_LEGS)
@@ -453,17 +376,10 @@ class RobotDescription(Data):
         description="groups of legs for gait parameters, by the names of their legs, besides front,"
         " middle, hind, left, right, all and each leg",
     )
-    guesses: tuple[Sentence, ...] = Field(
-        default=(),
-        exclude_if=operator.not_,
-        description="guesses of `robot init`, shown by `robot check`; remove verified ones",
-    )
-    held_joints: dict[PartName, Number] = Field(
-        default={},
-        exclude_if=operator.not_,
-        description="movable joints that belong to no leg, each with the angle at which it is fixed"
-        " [rad]",
-    )
+    guesses: tuple[Sentence, ...] = Field(default=(), exclude_if=operator.not_)
+    """guesses of `robot init`, shown by `robot check`; remove verified ones"""
+    held_joints: dict[PartName, Number] = Field(default={}, exclude_if=operator.not_)
+    """movable joints that belong to no leg, each with the angle at which it is fixed [rad]"""
 
     @model_validator(mode="after")
     def _names_exist(self) -> RobotDescription:

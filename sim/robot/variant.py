@@ -86,22 +86,15 @@ class RobotVariant(Data):
     """A shipped robot, modelled in more detail than by default."""
 
     name: RobotName = Field(default=DEFAULT_ROBOT, description="Robot to start from.")
-    contact_law: ContactLaw | None = Field(
-        default=None,
-        description="Friction law of the soles: linear_zone, karnopp, stick or dead_zone; null is"
-        " the robot's own law.",
-    )
-    backlash: Degrees = Field(
-        default=(0.0, 0.0, 0.0),
-        description="Backlash between gearhead and link of coxa, femur and tibia, end to end [deg];"
-        " measured at 2 to 3 on the robot. Simulated at 40 kHz, so eight times slower.",
-        examples=[(2.5, 1.0, 1.0)],
-    )
-    planned_soles: PlannedSoles | None = Field(
-        default=None,
-        description="Sole lengths that the gait assumes: nominal, as in the datasheet for all legs,"
-        " or own, each leg's; null is the robot's default, nominal.",
-    )
+    contact_law: ContactLaw | None = None
+    """Friction law of the soles: linear_zone, karnopp, stick or dead_zone; null is the robot's own
+    law."""
+    backlash: Degrees = Field(default=(0.0, 0.0, 0.0), examples=[(2.5, 1.0, 1.0)])
+    """Backlash between gearhead and link of coxa, femur and tibia, end to end [deg]; measured at 2
+    to 3 on the robot. Simulated at 40 kHz, so eight times slower."""
+    planned_soles: PlannedSoles | None = None
+    """Sole lengths that the gait assumes: nominal, as in the datasheet for all legs, or own, each
+    leg's; null is the robot's default, nominal."""
 
 
 class RobotFiles(BaseModel):

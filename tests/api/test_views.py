@@ -63,6 +63,12 @@ def test_docstrings_below_fields_are_their_descriptions_in_schemas() -> None:
     )
 
 
+def test_a_model_without_a_source_file_has_a_schema() -> None:
+    defined: dict[str, Any] = {"__name__": "an_interpreter", "View": View}
+    exec("class Hand(View):\n    mass: float", defined)  # noqa: S102
+    assert "description" not in defined["Hand"].model_json_schema()["properties"]["mass"]
+
+
 def test_numbers_that_are_not_finite_are_null(job: Job) -> None:
     evaluation = Evaluation(
         iteration=0,

@@ -91,10 +91,8 @@ class LimitView(View):
     value: float = Field(description="Value of the design.", examples=[0.041])
     relation: Literal[">=", "<="] = Field(description="Side of the limit that is allowed.")
     limit: float = Field(description="The limit.", examples=[0.05])
-    excess: float = Field(
-        description="By how much the value is beyond the limit, as a share of it; 0 if kept [1].",
-        examples=[0.18],
-    )
+    excess: float = Field(examples=[0.18])
+    """By how much the value is beyond the limit, as a share of it; 0 if kept [1]."""
 
     def __str__(self) -> str:
         side = "at least" if self.relation == ">=" else "at most"
@@ -108,9 +106,8 @@ class ClosestView(View):
     iteration: IterationIndex
     particle: Particle
     design: DesignValues
-    violation: float = Field(
-        description="Sum of its excesses over all limits [1].", examples=[0.31]
-    )
+    violation: float = Field(examples=[0.31])
+    """Sum of its excesses over all limits [1]."""
     violated: list[LimitView] = Field(description="The limits that it violates, the worst first.")
     explanation: str = Field(
         description="The state in a sentence.",

@@ -53,25 +53,20 @@ class ProportionView(View):
 
     count: int = Field(description="Worlds in which it happened.", examples=[3])
     share: float = Field(description="Of all worlds [1].", examples=[0.003])
-    low: float = Field(
-        description="Lower end of the exact interval of 95 % (Clopper and Pearson 1934) [1]."
-    )
+    low: float
+    """Lower end of the exact interval of 95 % (Clopper and Pearson 1934) [1]."""
     high: float = Field(description="Upper end [1].", examples=[0.0087])
 
 
 class SpreadView(View):
     """Distribution of a quantity over worlds; lower is better, and a failure is worse than any."""
 
-    quantiles: list[Finite] = Field(
-        description="At the certificate's `quantiles`; null where a quantile is a failure.",
-        examples=[[19.8, 20.4, 21.0, 21.9, 24.2]],
-    )
+    quantiles: list[Finite] = Field(examples=[[19.8, 20.4, 21.0, 21.9, 24.2]])
+    """At the certificate's `quantiles`; null where a quantile is a failure."""
     worst: Finite = Field(description="The greatest without failures; null if all failed.")
-    cvar: Finite = Field(
-        description="Conditional value at risk: mean of the worst 5 % of worlds. A failure counts"
-        " as `worst`, so that with failures this is a lower bound; null if all failed.",
-        examples=[26.3],
-    )
+    cvar: Finite = Field(examples=[26.3])
+    """Conditional value at risk: mean of the worst 5 % of worlds. A failure counts as `worst`, so
+    that with failures this is a lower bound; null if all failed."""
     tail_failed: float = Field(description="Share of these 5 % that failed [1].", examples=[0.06])
     nominal: Finite = Field(description="In the nominal world; null after a failure.")
 
@@ -85,17 +80,14 @@ Utility = Field(description="By the job's preference (eq. 3.8, 4.1) [1].")
 class CertifiedScenarioView(View):
     """One scenario over all worlds."""
 
-    held_out: bool = Field(
-        description="Whether it is one of the spec's `held_out`, which the design was not tuned in;"
-        " without them a preset for which no design of the thesis was optimized."
-    )
-    statuses: dict[StatusName, int] = Field(
-        description="Simulations by status; missing ones are 0.", examples=[{"ok": 997, "fell": 3}]
-    )
+    held_out: bool
+    """Whether it is one of the spec's `held_out`, which the design was not tuned in; without them a
+    preset for which no design of the thesis was optimized."""
+    statuses: dict[StatusName, int] = Field(examples=[{"ok": 997, "fell": 3}])
+    """Simulations by status; missing ones are 0."""
     fell: ProportionView = Field(description="How often the robot fell.")
-    failed: ProportionView = Field(
-        description="Failures of any kind: fell, diverged, stalled or out of reach."
-    )
+    failed: ProportionView
+    """Failures of any kind: fell, diverged, stalled or out of reach."""
     utility: Annotated[SpreadView, Utility]
     objectives: Annotated[dict[str, SpreadView], Objectives]
 
@@ -106,21 +98,15 @@ class WorldView(View):
     world: int = Field(description="Number of the world, from 0.", examples=[417])
     iteration: IterationIndex
     particle: Particle
-    fitness: Finite = Field(
-        description="Geometric mean over the scenarios (eq. 4.2) [1]; null if one failed.",
-        examples=[31.7],
-    )
-    failures: dict[str, StatusName] = Field(
-        description="Failed scenarios with their statuses.", examples=[{"slope-fast": "fell"}]
-    )
-    scenario: str = Field(
-        description="The worst scenario: one that failed, or else the one whose utility is the"
-        " greatest multiple of that in the nominal world.",
-        examples=["slope-fast"],
-    )
-    values: dict[str, float | str] = Field(
-        description="Value of every perturbation that is drawn or fixed, by name."
-    )
+    fitness: Finite = Field(examples=[31.7])
+    """Geometric mean over the scenarios (eq. 4.2) [1]; null if one failed."""
+    failures: dict[str, StatusName] = Field(examples=[{"slope-fast": "fell"}])
+    """Failed scenarios with their statuses."""
+    scenario: str = Field(examples=["slope-fast"])
+    """The worst scenario: one that failed, or else the one whose utility is the greatest multiple
+    of that in the nominal world."""
+    values: dict[str, float | str]
+    """Value of every perturbation that is drawn or fixed, by name."""
     replay: str = Field(
         description="The command that simulates the design in this world again.",
         examples=["gaitswarm certify k2q7zr5dm9xw --replay 417 --scenarios slope-fast"],
@@ -131,11 +117,9 @@ class InfluenceView(View):
     """Correlation of a perturbation with the outcome."""
 
     name: str = Field(description="Name of the perturbation.", examples=["friction"])
-    correlation: float = Field(
-        description="Spearman's, of its value with the fitness, failed worlds sharing the last rank"
-        " [1]. Positive: greater values go with worse outcomes.",
-        examples=[-0.62],
-    )
+    correlation: float = Field(examples=[-0.62])
+    """Spearman's, of its value with the fitness, failed worlds sharing the last rank [1]. Positive:
+    greater values go with worse outcomes."""
     low: float = Field(description="Lower end of its interval of 95 % [1].", examples=[-0.66])
     high: float = Field(description="Upper end [1].", examples=[-0.58])
 
@@ -145,11 +129,8 @@ class ComparedView(View):
 
     ours: Finite = Field(description="By our engine; null after a failure.", examples=[7.805])
     theirs: Finite = Field(description="By the other engine; null after a failure.")
-    difference: Finite = Field(
-        description="Excess of the other engine's, as a share of ours [1]; null if either is, or if"
-        " ours is 0.",
-        examples=[-0.0003],
-    )
+    difference: Finite = Field(examples=[-0.0003])
+    """Excess of the other engine's, as a share of ours [1]; null if either is, or if ours is 0."""
 
 
 class ComparedScenarioView(View):
@@ -166,9 +147,8 @@ class ComparedEngineView(View):
 
     description: str = Field(description="Properties of the engine.", examples=[ENGINES["mujoco"]])
     fitness: ComparedView = Field(description="Over all scenarios (eq. 4.2) [1].")
-    scenarios: dict[str, ComparedScenarioView] = Field(
-        description="By name of the scenario, in the job's order."
-    )
+    scenarios: dict[str, ComparedScenarioView]
+    """By name of the scenario, in the job's order."""
 
 
 class CertificateView(View):
@@ -182,30 +162,22 @@ class CertificateView(View):
     seed: int = Field(description="Of the worlds.", examples=[1])
     worlds: int = Field(description="Worlds simulated so far.", examples=[1000])
     worlds_planned: int = Field(description="Worlds of the whole job.", examples=[1000])
-    level: float = Field(
-        default=LEVEL, description="Of intervals and of the conditional value at risk [1]."
-    )
-    quantiles: list[float] = Field(
-        description="Quantiles of the distributions [1].", examples=[list(QUANTILES)]
-    )
-    fitness: SpreadView = Field(
-        description="Over all scenarios, the geometric mean of utilities (eq. 4.2) [1]."
-    )
+    level: float = LEVEL
+    """Of intervals and of the conditional value at risk [1]."""
+    quantiles: list[float] = Field(examples=[list(QUANTILES)])
+    """Quantiles of the distributions [1]."""
+    fitness: SpreadView
+    """Over all scenarios, the geometric mean of utilities (eq. 4.2) [1]."""
     fell: ProportionView = Field(description="Worlds with a fall in at least one scenario.")
     failed: ProportionView = Field(description="Worlds with a failure in at least one scenario.")
-    scenarios: dict[str, CertifiedScenarioView] = Field(
-        description="By name of the scenario, in the job's order."
-    )
-    worst: list[WorldView] = Field(
-        description="The worst worlds, those with most failed scenarios first."
-    )
-    influences: list[InfluenceView] = Field(
-        description="Correlations of perturbations with the outcome, the strongest first."
-    )
-    engines: dict[str, ComparedEngineView] = Field(
-        default_factory=dict,
-        description="Results of the job's `engines` in the nominal world, by name.",
-    )
+    scenarios: dict[str, CertifiedScenarioView]
+    """By name of the scenario, in the job's order."""
+    worst: list[WorldView]
+    """The worst worlds, those with most failed scenarios first."""
+    influences: list[InfluenceView]
+    """Correlations of perturbations with the outcome, the strongest first."""
+    engines: dict[str, ComparedEngineView] = Field(default_factory=dict)
+    """Results of the job's `engines` in the nominal world, by name."""
 
 
 def certificate(

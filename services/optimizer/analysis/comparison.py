@@ -44,18 +44,15 @@ class ConvergenceView(View):
     iterations: list[int] = Field(description="Index of each of them, from 0.", examples=[[0, 24]])
     evaluations: list[int] = Field(description="Designs evaluated by then.", examples=[[25, 625]])
     seconds: list[float] = Field(description="Time of evaluation by then [s].")
-    best_so_far: list[Finite] = Field(
-        description="Least fitness by then; null while every design has failed.",
-        examples=[[31.0, 17.2]],
-    )
+    best_so_far: list[Finite] = Field(examples=[[31.0, 17.2]])
+    """Least fitness by then; null while every design has failed."""
 
 
 class ConvergencesView(View):
     """Convergence of several jobs."""
 
-    items: list[ConvergenceView] = Field(
-        description="Jobs in the requested order, without deleted ones."
-    )
+    items: list[ConvergenceView]
+    """Jobs in the requested order, without deleted ones."""
 
 
 class ComparedJobView(View):
@@ -65,40 +62,27 @@ class ComparedJobView(View):
     name: str = Field(description="Name of the job.", examples=["chapter 4, preference A"])
     state: JobState = Field(description="Its state.", examples=["succeeded"])
     best_fitness: Finite = Field(description="Least fitness so far.", examples=[17.2])
-    reference: ReferenceView | None = Field(
-        default=None, description="Published design that it is compared with, once known."
-    )
-    gain: Finite = Field(
-        default=None,
-        description="Relative improvement of `best_fitness` over that of `reference` [1]; null if"
-        " undefined.",
-        examples=[0.39],
-    )
+    reference: ReferenceView | None = None
+    """Published design that it is compared with, once known."""
+    gain: Finite = Field(default=None, examples=[0.39])
+    """Relative improvement of `best_fitness` over that of `reference` [1]; null if undefined."""
     evaluations: int = Field(description="Designs evaluated so far.", examples=[625])
     failed: int = Field(description="Of these, those that failed.", examples=[12])
     convergence: ConvergenceView = Field(description="Its convergence.")
-    shares: list[float] = Field(
-        description="Shares of its designs that succeed in every case, rising from 0 to 1 [1].",
-        examples=[[0.0, 0.5, 1.0]],
-    )
-    fitness: list[float] = Field(
-        description="Quantile of the fitness at each of these shares.",
-        examples=[[17.2, 25.1, 310.0]],
-    )
+    shares: list[float] = Field(examples=[[0.0, 0.5, 1.0]])
+    """Shares of its designs that succeed in every case, rising from 0 to 1 [1]."""
+    fitness: list[float] = Field(examples=[[17.2, 25.1, 310.0]])
+    """Quantile of the fitness at each of these shares."""
 
 
 class SpecDifferenceView(View):
     """A difference between the specs of jobs, names aside."""
 
-    field: str = Field(
-        description="Path of the field. A variable is one, as is a scenario that some specs lack.",
-        examples=["optimizer.particles"],
-    )
-    values: list[str | None] = Field(
-        description="As JSON, by job; null where a spec has none. Of a variable its range in words;"
-        " of a scenario that some specs lack its values that are not defaults.",
-        examples=[["25", "50"]],
-    )
+    field: str = Field(examples=["optimizer.particles"])
+    """Path of the field. A variable is one, as is a scenario that some specs lack."""
+    values: list[str | None] = Field(examples=[["25", "50"]])
+    """As JSON, by job; null where a spec has none. Of a variable its range in words; of a scenario
+    that some specs lack its values that are not defaults."""
 
 
 class JobComparisonView(View):
@@ -106,10 +90,9 @@ class JobComparisonView(View):
 
     jobs: list[ComparedJobView] = Field(description="In the requested order.")
     differences: list[SpecDifferenceView] = Field(description="Fields whose values differ.")
-    comparable: bool = Field(
-        description="Whether all have the same measure: kind, robot, scenarios, preference and"
-        " worlds. If not, their fitness is not the same quantity."
-    )
+    comparable: bool
+    """Whether all have the same measure: kind, robot, scenarios, preference and worlds. If not,
+    their fitness is not the same quantity."""
 
 
 def comparison(

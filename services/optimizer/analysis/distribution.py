@@ -62,26 +62,21 @@ class DistributionItemView(View):
     """Distribution of the designs of one iteration."""
 
     index: IterationIndex
-    fitness: list[Finite] = Field(
-        description="One fitness for each of `quantiles`; null where every design failed.",
-        examples=[[20.9, 21.0, 21.4, 22.3, 24.0, 29.1, 41.7]],
-    )
+    fitness: list[Finite] = Field(examples=[[20.9, 21.0, 21.4, 22.3, 24.0, 29.1, 41.7]])
+    """One fitness for each of `quantiles`; null where every design failed."""
     mean: Finite = Field(description="Mean of its finite fitnesses.", examples=[23.2])
     failed: int = Field(description="Designs that failed in at least one scenario.")
-    diversity: Finite = Field(
-        description="Standard deviation of the designs as a share of each searched variable's"
-        " range, mean over these variables [1]: 0 when the search has converged; null for an"
-        " iteration of a single design.",
-        examples=[0.12],
-    )
+    diversity: Finite = Field(examples=[0.12])
+    """Standard deviation of the designs as a share of each searched variable's range, mean over
+    these variables [1]: 0 when the search has converged; null for an iteration of a single
+    design."""
 
 
 class DistributionView(View):
     """A page of the designs' distribution. The list is complete when `next` is null."""
 
-    quantiles: list[float] = Field(
-        description="Shares of the designs that `fitness` is given for.", examples=[list(QUANTILES)]
-    )
+    quantiles: list[float] = Field(examples=[list(QUANTILES)])
+    """Shares of the designs that `fitness` is given for."""
     items: list[DistributionItemView] = Field(description="Iterations, in order.")
     next: NextPage
 
@@ -168,10 +163,9 @@ def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
 class ParticleColumnView(View):
     """Meaning of one column of numbers."""
 
-    name: str = Field(
-        description="`iteration`, `particle`, `fitness`, a searched variable's name,"
-        " `utility:<scenario>`, or `objective:<name>`."
-    )
+    name: str
+    """`iteration`, `particle`, `fitness`, a searched variable's name, `utility:<scenario>`, or
+    `objective:<name>`."""
     unit: str = Field(description="Unit of its numbers.", examples=["counts"])
     low: float | None = Field(description="Lower bound of a variable; else null.")
     high: float | None = Field(description="Upper bound of a variable; else null.")
@@ -181,9 +175,8 @@ class ParticleColumnView(View):
         description="`continuous`, `integer` and `categorical` are variables,"
         " `objective` is an objective's geometric mean over the scenarios."
     )
-    choices: list[str] = Field(
-        description="Names of a categorical variable's choices; its numbers are their indices."
-    )
+    choices: list[str]
+    """Names of a categorical variable's choices; its numbers are their indices."""
 
 
 class ParticlesHeaderView(View):
@@ -192,10 +185,8 @@ class ParticlesHeaderView(View):
     job_id: JobName
     rows: int = Field(description="Evaluations that follow: numbers of each column.")
     total: int = Field(description="Evaluations from which the rows were chosen.")
-    iterations: tuple[int, int] | None = Field(
-        description="First and last iteration among the rows; null without any.",
-        examples=[(0, 24)],
-    )
+    iterations: tuple[int, int] | None = Field(examples=[(0, 24)])
+    """First and last iteration among the rows; null without any."""
     columns: list[ParticleColumnView] = Field(description="The columns, in order.")
 
 
@@ -255,9 +246,8 @@ class CaseFailuresView(View):
     case: str = Field(description="Name of the scenario, world or walk.", examples=["loaded-fast"])
     failed: int = Field(description="Designs that fail in this case.", examples=[14])
     alone: int = Field(description="Designs that fail in this case alone.")
-    statuses: list[StatusFailuresView] = Field(
-        description="Most frequent first, each with its latest design."
-    )
+    statuses: list[StatusFailuresView]
+    """Most frequent first, each with its latest design."""
 
 
 class FailuresView(View):
@@ -265,10 +255,8 @@ class FailuresView(View):
 
     designs: int = Field(description="Evaluated designs.", examples=[625])
     failed: int = Field(description="Designs that fail in at least one case.")
-    recent: float | None = Field(
-        description="Share of failed designs in the latest quarter of the designs [1]; null"
-        " without designs."
-    )
+    recent: float | None
+    """Share of failed designs in the latest quarter of the designs [1]; null without designs."""
     cases: list[CaseFailuresView] = Field(description="Cases with failures, most failures first.")
 
 

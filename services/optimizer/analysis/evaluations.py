@@ -37,11 +37,9 @@ class ScenarioResultView(View):
 
     status: StatusName = Field(description="Status of the simulation; only `ok` is a success.")
     explanation: str = Field(description="The status in a sentence, with what to do about it.")
-    utility: float | None = Field(
-        description="Minimized; null if the simulation failed. In a scenario the bias-weighted"
-        " product of objectives (eq. 3.8, 4.1) [1], of a fit the mean absolute error [A].",
-        examples=[21.05],
-    )
+    utility: float | None = Field(examples=[21.05])
+    """Minimized; null if the simulation failed. In a scenario the bias-weighted product of
+    objectives (eq. 3.8, 4.1) [1], of a fit the mean absolute error [A]."""
     objectives: dict[str, float | None] = Field(
         description="Raw objectives by name, minimized; units are in the job's `objectives`, those"
         f" of table 4.1 {', '.join(f'{o.name} [{o.unit}]' for o in OBJECTIVES)}.",
@@ -62,27 +60,17 @@ class EvaluationView(View):
 
     iteration: IterationIndex
     particle: Particle
-    fitness: float | None = Field(
-        description="Minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or mean"
-        " error of the fits (eq. 2.21) [A]; null if the design failed in any case, or is"
-        " infeasible.",
-        examples=[20.87],
-    )
-    violation: Finite = Field(
-        default=None,
-        description="Sum of the relative excesses over all limits of the constraints, 0 for a"
-        " feasible design [1]; null without constraints, or if the design failed.",
-        examples=[0.0],
-    )
-    figure_of_merit: float | None = Field(
-        default=None,
-        description="Maximized: F of eq. 3.1 [1] under the preference chapter-3, else null.",
-        examples=[6.9],
-    )
+    fitness: float | None = Field(examples=[20.87])
+    """Minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or mean error of the
+    fits (eq. 2.21) [A]; null if the design failed in any case, or is infeasible."""
+    violation: Finite = Field(default=None, examples=[0.0])
+    """Sum of the relative excesses over all limits of the constraints, 0 for a feasible design [1];
+    null without constraints, or if the design failed."""
+    figure_of_merit: float | None = Field(default=None, examples=[6.9])
+    """Maximized: F of eq. 3.1 [1] under the preference chapter-3, else null."""
     design: DesignValues
-    scenarios: dict[str, ScenarioResultView] = Field(
-        description="Result in each case, by the scenario's name or the recording's short id."
-    )
+    scenarios: dict[str, ScenarioResultView]
+    """Result in each case, by the scenario's name or the recording's short id."""
 
 
 _EVALUATIONS: Final = TypeAdapter(list[EvaluationView])

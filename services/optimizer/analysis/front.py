@@ -133,38 +133,32 @@ class TradeOffDesignView(View):
     iteration: IterationIndex
     particle: Particle
     design: DesignValues
-    objectives: dict[str, float] = Field(
-        description="Each objective's geometric mean over the scenarios, minimized; units are in"
-        " the front's `objectives`.",
-        examples=[_EXAMPLE],
-    )
+    objectives: dict[str, float] = Field(examples=[_EXAMPLE])
+    """Each objective's geometric mean over the scenarios, minimized; units are in the front's
+    `objectives`."""
     fitness: OwnFitness
 
 
 class NormalisedDesignView(TradeOffDesignView):
     """A design of a job with respect to the job's front."""
 
-    normalised: dict[str, float] = Field(
-        description="Logarithm of each objective, 0 at the front's ideal and 1 at its nadir [1].",
-        examples=[dict.fromkeys(_EXAMPLE, 0.25)],
-    )
+    normalised: dict[str, float] = Field(examples=[dict.fromkeys(_EXAMPLE, 0.25)])
+    """Logarithm of each objective, 0 at the front's ideal and 1 at its nadir [1]."""
 
 
 class FrontDesignView(NormalisedDesignView):
     """A design that no other of its job dominates."""
 
-    marks: list[str] = Field(
-        description="Labels: `knee 1`, `least energy`, `best under A`, `best of the job` and so on."
-    )
+    marks: list[str]
+    """Labels: `knee 1`, `least energy`, `best under A`, `best of the job` and so on."""
 
 
 class KneeView(NormalisedDesignView):
     """A design that is nearer to the ideal than those around it."""
 
-    distance: float = Field(
-        description="From the plane of equal intercepts through the mean of the extremes, in"
-        " normalised objectives [1]."
-    )
+    distance: float
+    """From the plane of equal intercepts through the mean of the extremes, in normalised objectives
+    [1]."""
 
 
 class ExtremeView(NormalisedDesignView):
@@ -195,59 +189,41 @@ class FrontIterationView(View):
 class FrontRequest(Request):
     """Constraints of the designs on a front, and how many to list."""
 
-    most: int = Field(
-        default=FRONT_DESIGNS,
-        ge=1,
-        le=MOST_FRONT_DESIGNS,
-        description="Maximum number of designs to list.",
-    )
-    constraints: Constraints | None = Field(
-        default=None,
-        description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
-        " list: none.",
-        examples=[["speed>=0.05"]],
-    )
+    most: int = Field(default=FRONT_DESIGNS, ge=1, le=MOST_FRONT_DESIGNS)
+    """Maximum number of designs to list."""
+    constraints: Constraints | None = Field(default=None, examples=[["speed>=0.05"]])
+    """Limits that a design must keep, as in a spec; null: those of the job, an empty list: none."""
 
 
 class FrontView(View):
     """The Pareto front of a job, without simulation."""
 
     objectives: list[ObjectiveView] = Field(description="f1 to f5 of table 4.1, in order.")
-    designs_judged: int = Field(
-        description="Designs of the job that succeed in all scenarios and keep the constraints."
-    )
+    designs_judged: int
+    """Designs of the job that succeed in all scenarios and keep the constraints."""
     failed: int = Field(description="Designs that fail in a scenario.")
     infeasible: int = Field(description="Others, which violate a constraint.")
     size: int = Field(description="Nondominated designs; of equal ones the earliest.")
     ideal: dict[str, float] = Field(description="Least of the front in each objective.")
     nadir: dict[str, float] = Field(description="Greatest of the front in each objective.")
-    reference: dict[str, float] = Field(
-        description="Reference point of the hypervolume: a tenth of the front's range beyond the"
-        " nadir, in logarithms."
-    )
-    hypervolume: float = Field(
-        description="Share of the box between ideal and reference that the front dominates, in"
-        " logarithms [1].",
-        examples=[0.63],
-    )
-    hypervolume_error: float = Field(
-        description="Its standard error [1]: it is estimated from random points."
-    )
-    iterations: list[FrontIterationView] = Field(
-        description="Hypervolume by iteration, in the same box; it never falls."
-    )
-    knees: list[KneeView] = Field(
-        description="At most five, the most pronounced first: nearer to the ideal than all designs"
-        " that differ by less than a quarter of the front's range in each objective."
-    )
+    reference: dict[str, float]
+    """Reference point of the hypervolume: a tenth of the front's range beyond the nadir, in
+    logarithms."""
+    hypervolume: float = Field(examples=[0.63])
+    """Share of the box between ideal and reference that the front dominates, in logarithms [1]."""
+    hypervolume_error: float
+    """Its standard error [1]: it is estimated from random points."""
+    iterations: list[FrontIterationView]
+    """Hypervolume by iteration, in the same box; it never falls."""
+    knees: list[KneeView]
+    """At most five, the most pronounced first: nearer to the ideal than all designs that differ by
+    less than a quarter of the front's range in each objective."""
     extremes: list[ExtremeView] = Field(description="The best design in each objective.")
-    winners: list[FrontWinnerView] = Field(
-        description="The best designs under A, B and C and under the job's own preference."
-    )
-    designs: list[FrontDesignView] = Field(
-        description="Designs of the front, in the order in which they were tried. Of a front of"
-        " more than requested: labelled designs, and others that cover it evenly."
-    )
+    winners: list[FrontWinnerView]
+    """The best designs under A, B and C and under the job's own preference."""
+    designs: list[FrontDesignView]
+    """Designs of the front, in the order in which they were tried. Of a front of more than
+    requested: labelled designs, and others that cover it evenly."""
 
 
 def pareto_front(

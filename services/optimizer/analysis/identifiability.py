@@ -63,17 +63,13 @@ class ChoiceView(View):
     """One choice of a categorical parameter."""
 
     name: str = Field(description="Name of the choice.", examples=["stick"])
-    fitness: Finite = Field(
-        description="Least fitness of all runs among designs with it; null if all failed, or none"
-        " was tried.",
-        examples=[0.84],
-    )
+    fitness: Finite = Field(examples=[0.84])
+    """Least fitness of all runs among designs with it; null if all failed, or none was tried."""
     by_run: list[Finite] = Field(description="The same of each run.", examples=[[0.84, None]])
-    remains: bool = Field(
-        description="Whether a run has it among the designs that count as good as its best: within"
-        " 5 %, of a calibration those whose sum of squared differences, in tolerances, is at most 4"
-        " (times the best fitness squared, if that is above 1) greater."
-    )
+    remains: bool
+    """Whether a run has it among the designs that count as good as its best: within 5 %, of a
+    calibration those whose sum of squared differences, in tolerances, is at most 4 (times the best
+    fitness squared, if that is above 1) greater."""
 
 
 class ParameterView(View):
@@ -83,27 +79,20 @@ class ParameterView(View):
     unit: str = Field(description="Its unit.", examples=["V"])
     low: float = Field(description="Lower bound of the search.", examples=[8.0])
     high: float = Field(description="Upper bound of the search.", examples=[13.0])
-    best: float | str = Field(
-        description="Value in the best design of all runs, of a categorical parameter a choice.",
-        examples=[11.1],
-    )
-    bests: list[float | str] = Field(
-        description="Value in each run's best design.", examples=[[11.1, 11.2, 11.0]]
-    )
-    intervals: list[IntervalView] = Field(
-        description="One for each of `thresholds`, over all runs; of a categorical parameter"
-        " indices of choices."
-    )
+    best: float | str = Field(examples=[11.1])
+    """Value in the best design of all runs, of a categorical parameter a choice."""
+    bests: list[float | str] = Field(examples=[[11.1, 11.2, 11.0]])
+    """Value in each run's best design."""
+    intervals: list[IntervalView]
+    """One for each of `thresholds`, over all runs; of a categorical parameter indices of
+    choices."""
     choices: list[ChoiceView] = Field(description="Those of a categorical parameter; else none.")
-    trust: Trust | None = Field(
-        description="Agreement of the runs among designs as good as their best (see `remains` of"
-        " choices): within 15 %, within 35 %, or not within 35 % of the searched range; of a"
-        " categorical parameter on one choice, on some, or on none; null for a single run."
-    )
-    explanation: str | None = Field(
-        description="The same in a sentence.",
-        examples=["all runs agree on a small part of the range"],
-    )
+    trust: Trust | None
+    """Agreement of the runs among designs as good as their best (see `remains` of choices): within
+    15 %, within 35 %, or not within 35 % of the searched range; of a categorical parameter on one
+    choice, on some, or on none; null for a single run."""
+    explanation: str | None = Field(examples=["all runs agree on a small part of the range"])
+    """The same in a sentence."""
 
 
 class IdentifiabilityView(View):
@@ -111,9 +100,8 @@ class IdentifiabilityView(View):
 
     jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
     fitness: list[float] = Field(description="Each run's least fitness.", examples=[[0.0312]])
-    thresholds: list[float] = Field(
-        description="Distances from a run's best fitness, as shares of it [1]."
-    )
+    thresholds: list[float]
+    """Distances from a run's best fitness, as shares of it [1]."""
     designs: list[int] = Field(description="Number of designs of all runs within each of them.")
     parameters: list[ParameterView] = Field(description="Every variable that was searched.")
 
@@ -248,29 +236,25 @@ class ReachedView(View):
     """Simulated value of one target."""
 
     simulated: Finite = Field(description="In the target's unit; null if its simulation failed.")
-    difference: Finite = Field(
-        description="From the target's value, in tolerances: ln(simulated / value) /"
-        " ln(1 + tolerance), of height_loss (simulated - value) / tolerance.",
-        examples=[0.69],
-    )
+    difference: Finite = Field(examples=[0.69])
+    """From the target's value, in tolerances: ln(simulated / value) / ln(1 + tolerance), of
+    height_loss (simulated - value) / tolerance."""
 
 
 class TargetResultView(ReachedView):
     """One target and the best design's value."""
 
     walk: str = Field(description="Label of the simulation.", examples=["fuzzy-pso-ps"])
-    relative_to: str | None = Field(
-        description="Simulation that the value is the ratio to; null for a value of its own."
-    )
+    relative_to: str | None
+    """Simulation that the value is the ratio to; null for a value of its own."""
     quantity: str = Field(description="Measured quantity.", examples=["energy"])
     unit: str = Field(description="Unit of the value; 1 for a ratio.", examples=["J/m"])
     value: float = Field(description="The target.", examples=[41.96])
     tolerance: float = Field(description="Relative tolerance; of height_loss in metres.")
     use: str = Field(description="fit, or predict for one that is only compared.", examples=["fit"])
-    left_out: ReachedView | None = Field(
-        description="Value of the design that is best without this target; null if that was"
-        " not requested, the target is not fitted, or no other target is."
-    )
+    left_out: ReachedView | None
+    """Value of the design that is best without this target; null if that was not requested, the
+    target is not fitted, or no other target is."""
 
 
 class TargetsView(View):
@@ -280,10 +264,8 @@ class TargetsView(View):
     job: str = Field(description="The run of the best design.", examples=["k2q7zr5dm9xw"])
     iteration: IterationIndex
     particle: Particle
-    fitness: float = Field(
-        description="Root mean square of the differences of fitted targets, in tolerances [1].",
-        examples=[0.84],
-    )
+    fitness: float = Field(examples=[0.84])
+    """Root mean square of the differences of fitted targets, in tolerances [1]."""
     design: DesignValues
     targets: list[TargetResultView] = Field(description="Every target, in the job's order.")
 

@@ -51,10 +51,8 @@ _RESAMPLE: Final = 0x1337
 class IndexIntervalView(View):
     """A first-order Sobol' index [1] with its interval."""
 
-    value: float = Field(
-        description="Share of the variance of the output's rank explained by this variable alone.",
-        examples=[0.41],
-    )
+    value: float = Field(examples=[0.41])
+    """Share of the variance of the output's rank explained by this variable alone."""
     low: float = Field(description="Lower end of the interval of 95 %.", examples=[0.35])
     high: float = Field(description="Upper end.", examples=[0.47])
 
@@ -66,38 +64,28 @@ class VariableImportanceView(View):
     unit: str = Field(description="Its unit.", examples=["counts"])
     low: float = Field(description="Lower bound of the search.", examples=[1500.0])
     high: float = Field(description="Upper bound.", examples=[6000.0])
-    fitness: IndexIntervalView | None = Field(
-        description="Index for the fitness, among designs that succeed in every case; null if"
-        " there are too few, or all are equal."
-    )
-    failing: IndexIntervalView | None = Field(
-        description="Index for failure or infeasibility, among all designs; null if none fails, all"
-        " do, or there are too few."
-    )
-    objectives: dict[str, IndexIntervalView | None] = Field(
-        description="Index for each objective over all scenarios, among designs that succeed in"
-        " every scenario; empty for a job that tunes no drive."
-    )
-    moved_with: str | None = Field(
-        description="Variable of the greatest correlation with it among all designs: an effect of"
-        " one may be due to the other.",
-        examples=["FI2R"],
-    )
-    correlation: float | None = Field(
-        description="Spearman's rank correlation of the two [1].", examples=[0.62]
-    )
-    winner: float | None = Field(
-        description="Value in the job's best design, of a categorical variable the index of the"
-        " choice; null without one.",
-        examples=[5950.0],
-    )
-    at: End | None = Field(
-        description="Bound at which the winner lies, within a hundredth of the range."
-    )
-    widened: WidenedView | None = Field(
-        description="Wider bounds that can be simulated, by half the range or less; null if the"
-        " winner is inside, the job tunes no drive, or the controller sets the bound.",
-    )
+    fitness: IndexIntervalView | None
+    """Index for the fitness, among designs that succeed in every case; null if there are too few,
+    or all are equal."""
+    failing: IndexIntervalView | None
+    """Index for failure or infeasibility, among all designs; null if none fails, all do, or there
+    are too few."""
+    objectives: dict[str, IndexIntervalView | None]
+    """Index for each objective over all scenarios, among designs that succeed in every scenario;
+    empty for a job that tunes no drive."""
+    moved_with: str | None = Field(examples=["FI2R"])
+    """Variable of the greatest correlation with it among all designs: an effect of one may be due
+    to the other."""
+    correlation: float | None = Field(examples=[0.62])
+    """Spearman's rank correlation of the two [1]."""
+    winner: float | None = Field(examples=[5950.0])
+    """Value in the job's best design, of a categorical variable the index of the choice; null
+    without one."""
+    at: End | None
+    """Bound at which the winner lies, within a hundredth of the range."""
+    widened: WidenedView | None
+    """Wider bounds that can be simulated, by half the range or less; null if the winner is inside,
+    the job tunes no drive, or the controller sets the bound."""
 
 
 class ImportanceView(View):

@@ -55,24 +55,15 @@ from gaitswarm.sim.memory import require_room_for_scipy
 class RankingRequest(Request):
     """Preference and constraints by which to rank the designs of a job."""
 
-    preference: PreferenceChoice | None = Field(
-        default=None,
-        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
-        " your own; null: as by the job.",
-        examples=["B"],
-    )
-    constraints: Constraints | None = Field(
-        default=None,
-        description="Limits that a design must keep, as in a spec; null: those of the job, an empty"
-        " list: none.",
-        examples=[["speed>=0.05"]],
-    )
-    scenario_weights: ScenarioWeights | None = Field(
-        default=None, description="As in a spec; null: those of the job."
-    )
-    scenario_aggregate: ScenarioAggregate | None = Field(
-        default=None, description="As in a spec; null: that of the job."
-    )
+    preference: PreferenceChoice | None = Field(default=None, examples=["B"])
+    """How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or your own; null:
+    as by the job."""
+    constraints: Constraints | None = Field(default=None, examples=[["speed>=0.05"]])
+    """Limits that a design must keep, as in a spec; null: those of the job, an empty list: none."""
+    scenario_weights: ScenarioWeights | None = None
+    """As in a spec; null: those of the job."""
+    scenario_aggregate: ScenarioAggregate | None = None
+    """As in a spec; null: that of the job."""
     top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
 
 
@@ -81,9 +72,8 @@ class RankedDesignView(EvaluationView):
 
     fitness: float = Field(description="Under the requested preference [1].", examples=[20.8])
     rank: int = Field(description="Rank under the requested preference, from 1.")
-    rank_before: int | None = Field(
-        description="Rank under the job's own preference, from 1; null if it has none."
-    )
+    rank_before: int | None
+    """Rank under the job's own preference, from 1; null if it has none."""
     fitness_before: Finite = Field(description="By the job's own preference [1].")
 
 
@@ -99,18 +89,13 @@ class RankingView(View):
 
     preference: PreferenceChoice = Field(description="The requested preference.")
     evaluations: int = Field(description="Designs that were ranked.")
-    infeasible: int = Field(
-        description="Designs that did not fail and violate the requested constraints."
-    )
-    fitness_of_present_best: Finite = Field(
-        description="By the requested preference, of the job's own best design [1].",
-        examples=[23.1],
-    )
-    correlation: Finite = Field(
-        description="Spearman's rank correlation of both rankings, over the designs in"
-        " both [1]; null where it is undefined.",
-        examples=[0.83],
-    )
+    infeasible: int
+    """Designs that did not fail and violate the requested constraints."""
+    fitness_of_present_best: Finite = Field(examples=[23.1])
+    """By the requested preference, of the job's own best design [1]."""
+    correlation: Finite = Field(examples=[0.83])
+    """Spearman's rank correlation of both rankings, over the designs in both [1]; null where it is
+    undefined."""
     top: list[RankedDesignView] = Field(description="The best designs, best first.")
     best_so_far: list[BestSoFarView] = Field(description="One entry an iteration, in order.")
 
@@ -192,10 +177,9 @@ class PreferenceFitView(View):
     biases_of: list[PreferenceOwner] = Field(description="Whose biases these are.")
     rank: int = Field(description="Of the design, from 1; equal designs share it.")
     fitness: float = Field(description="Of the design under it [1].", examples=[4.81])
-    margin: Finite = Field(
-        description="Share by which the rival's fitness is worse, negative if it is better [1], for"
-        " exponents that sum to 1; null without a rival."
-    )
+    margin: Finite
+    """Share by which the rival's fitness is worse, negative if it is better [1], for exponents that
+    sum to 1; null without a rival."""
     rival: TradeOffDesignView | None = Field(description="The best of all other designs under it.")
 
 
@@ -205,14 +189,12 @@ class PreferenceForView(View):
     chosen: TradeOffDesignView = Field(description="The design.")
     on_front: bool = Field(description="Whether no other design of the job dominates it.")
     wins: bool = Field(description="Whether no design is better under the best of the fits.")
-    certain: bool = Field(
-        description="Whether it wins, or it is proven that no exponents with these biases let it"
-        " win; not proven for a job that judges in worlds or by the worst scenario."
-    )
-    fits: list[PreferenceFitView] = Field(
-        description="One for each set of biases, the job's own and those of A, B and C, the best"
-        " first: the exponents of the widest margin, or else of the best rank."
-    )
+    certain: bool
+    """Whether it wins, or it is proven that no exponents with these biases let it win; not proven
+    for a job that judges in worlds or by the worst scenario."""
+    fits: list[PreferenceFitView]
+    """One for each set of biases, the job's own and those of A, B and C, the best first: the
+    exponents of the widest margin, or else of the best rank."""
 
 
 def preference_for(columns: EvaluationColumns, row: int, spec: JobSpec) -> PreferenceForView:
@@ -350,25 +332,19 @@ class CandidatePreferenceView(View):
     preference: Preference = Field(description="By which the optimum was searched for.")
     named: str | None = Field(description="A, B or C of table 4.5; null for any other.")
     recommended: bool = Field(description="Whether its fitness is the least.")
-    fitness: float = Field(
-        description="Factor by which objectives may get worse [1]: exp(0.05 sensitivity) risk"
-        " unevenness / (1 - failures).",
-        examples=[2.43],
-    )
-    sensitivity: float = Field(
-        description="Robustness index of the optimum over its own variables [1]."
-    )
+    fitness: float = Field(examples=[2.43])
+    """Factor by which objectives may get worse [1]: exp(0.05 sensitivity) risk unevenness / (1 -
+    failures)."""
+    sensitivity: float
+    """Robustness index of the optimum over its own variables [1]."""
     failures: float = Field(description="Share of held-out worlds in which a scenario failed [1].")
-    risk: float = Field(
-        description="Mean of the objectives in the worst 5 % of these, by the nominal world [1]."
-    )
-    unevenness: float = Field(
-        description="Deviation of the changes from the reference over the scenarios, a factor [1]."
-    )
-    figures: Figures = Field(
-        description="Geometric means over the scenarios, in the units of table 4.1 and m/s;"
-        " `slowest` is the speed in the slowest scenario."
-    )
+    risk: float
+    """Mean of the objectives in the worst 5 % of these, by the nominal world [1]."""
+    unevenness: float
+    """Deviation of the changes from the reference over the scenarios, a factor [1]."""
+    figures: Figures
+    """Geometric means over the scenarios, in the units of table 4.1 and m/s; `slowest` is the speed
+    in the slowest scenario."""
     changes: Figures = Field(description="By which share they differ from the reference's [1].")
     design: DesignValues
 
@@ -382,9 +358,8 @@ class CandidatePreferencesView(View):
     evaluated: int = Field(description="Preferences so far, including those without an optimum.")
     reference: DesignValues
     reference_figures: Figures = Field(description="Its figures, as of the candidates.")
-    candidates: list[CandidatePreferenceView] = Field(
-        description="Those with a feasible optimum, of least fitness first."
-    )
+    candidates: list[CandidatePreferenceView]
+    """Those with a feasible optimum, of least fitness first."""
 
 
 def candidate_preferences(

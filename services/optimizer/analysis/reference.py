@@ -325,15 +325,12 @@ _COLUMNS: Final = tuple(result.name for result in RESULTS)
 class FigureView(View):
     """A quantity of the best design in one scenario."""
 
-    value: float = Field(
-        description="Of the best design, in the quantity's unit; the geometric mean over worlds.",
-        examples=[0.0463],
-    )
+    value: float = Field(examples=[0.0463])
+    """Of the best design, in the quantity's unit; the geometric mean over worlds."""
     reference: float = Field(description="Of the reference.", examples=[0.0417])
     change: float = Field(description="`value` / `reference` - 1 [1].", examples=[0.11])
-    judgement: Judgement = Field(
-        description="Whether that is better, worse, or by at most 0.5 % the same."
-    )
+    judgement: Judgement
+    """Whether that is better, worse, or by at most 0.5 % the same."""
 
 
 class QuantityView(View):
@@ -341,11 +338,8 @@ class QuantityView(View):
 
     name: str = Field(description="Name of the quantity.", examples=["speed"])
     unit: str = Field(description="Its unit.", examples=["m/s"])
-    change: float = Field(
-        description="Relative change of the geometric mean over scenarios, weighted as by the"
-        " job [1].",
-        examples=[0.11],
-    )
+    change: float = Field(examples=[0.11])
+    """Relative change of the geometric mean over scenarios, weighted as by the job [1]."""
     judgement: Judgement = Field(description="As of a figure.")
     scenarios: dict[str, FigureView] = Field(description="Figures by scenario.")
 
@@ -358,38 +352,31 @@ class BoundView(View):
     value: float = Field(description="Value in the best design.", examples=[5990.0])
     at: End = Field(description="Bound at which it lies, within a hundredth of the range.")
     bound: float = Field(description="That bound.", examples=[6000.0])
-    widened: WidenedView | None = Field(
-        description="Wider bounds, which can be simulated together with those of the other"
-        " variables; null if there are none."
-    )
+    widened: WidenedView | None
+    """Wider bounds, which can be simulated together with those of the other variables; null if
+    there are none."""
 
 
 class VerdictView(View):
     """A job's best design compared with its reference, in words and numbers."""
 
     id: JobName
-    reference: ReferenceView | None = Field(
-        description="The published or the start design, or the one requested."
-    )
+    reference: ReferenceView | None
+    """The published or the start design, or the one requested."""
     best_fitness: Finite = Field(description="Least fitness of the job so far [1].")
-    gain: Finite = Field(
-        description="Relative improvement over the reference [1]; null if undefined.",
-        examples=[0.39],
-    )
+    gain: Finite = Field(examples=[0.39])
+    """Relative improvement over the reference [1]; null if undefined."""
     reason: str | None = Field(description="Why there is no gain, in words; null if there is one.")
     sentences: list[str] = Field(
         description="Verdict in words.",
         examples=[["Compared with published A, 20 % better by fitness: 11 % faster."]],
     )
     quantities: list[QuantityView] = Field(description="Compared quantities; empty without any.")
-    figures: dict[Judgement, int] = Field(
-        description="Number of figures (objectives in scenarios) by judgement.",
-        examples=[{"better": 22, "same": 1, "worse": 7}],
-    )
+    figures: dict[Judgement, int] = Field(examples=[{"better": 22, "same": 1, "worse": 7}])
+    """Number of figures (objectives in scenarios) by judgement."""
     bounds: list[BoundView] = Field(description="Variables at a bound of the search.")
-    limits: list[LimitView] = Field(
-        description="Limits of constraints that the best design reaches, to within a hundredth."
-    )
+    limits: list[LimitView]
+    """Limits of constraints that the best design reaches, to within a hundredth."""
     widen: str | None = Field(
         description="Command that starts another search from the best designs within wider bounds;"
         " null if no wider bounds can be simulated.",

@@ -46,22 +46,13 @@ _RESAMPLE = 0xB0075
 class RobustnessRequest(WalksRequest):
     """A design, its scenarios, and the sample around it."""
 
-    variables: tuple[VariableChoice, ...] | None = Field(
-        default=None,
-        max_length=64,
-        description="Variables to vary, normalised by their bounds: names, whose"
-        " bounds are then those of /v1/controllers, or variables with bounds of your own. Null:"
-        " all of the controller's.",
-    )
-    samples: int = Field(
-        default=256, ge=8, le=4096, description="Designs to sample around the given one."
-    )
-    radius: float = Field(
-        default=0.02,
-        gt=0.0,
-        le=0.5,
-        description="Largest distance from it, as a share of each variable's bounds [1].",
-    )
+    variables: tuple[VariableChoice, ...] | None = Field(default=None, max_length=64)
+    """Variables to vary, normalised by their bounds: names, whose bounds are then those of
+    /v1/controllers, or variables with bounds of your own. Null: all of the controller's."""
+    samples: int = Field(default=256, ge=8, le=4096)
+    """Designs to sample around the given one."""
+    radius: float = Field(default=0.02, gt=0.0, le=0.5)
+    """Largest distance from it, as a share of each variable's bounds [1]."""
     seed: int = Field(default=1, ge=0, lt=2**63, description="Of the sample.")
 
     def sample(self) -> LocalSample:
@@ -117,9 +108,8 @@ class SensitivityView(View):
     Numbers are null if too few of the sample's simulations completed.
     """
 
-    index: IndexView | None = Field(
-        description="Frobenius norm of the Jacobian; over all scenarios the root mean square."
-    )
+    index: IndexView | None
+    """Frobenius norm of the Jacobian; over all scenarios the root mean square."""
     by_objective: ByObjective = Field(description="Norms of the Jacobian's rows [1].")
     by_variable: ByVariable = Field(description="Norms of the Jacobian's columns [1].")
 
@@ -127,9 +117,8 @@ class SensitivityView(View):
 class ScenarioRobustnessView(SensitivityView):
     """Effect of small changes of the variables in one scenario."""
 
-    jacobian: dict[str, ByVariable] = Field(
-        description="Of the objectives' logarithms, by objective and variable [1]."
-    )
+    jacobian: dict[str, ByVariable]
+    """Of the objectives' logarithms, by objective and variable [1]."""
     walked: int = Field(description="Simulations with all objectives.", examples=[257])
     failed: int = Field(description="Simulations without.", examples=[0])
 
@@ -151,17 +140,13 @@ class RobustnessView(Sensitivities):
     design: DesignValues
     precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
     samples: int = Field(description="Designs sampled around the given one.", examples=[256])
-    radius: float = Field(
-        description="Half the width of the box around the design, as a share of the bounds [1].",
-        examples=[0.02],
-    )
+    radius: float = Field(examples=[0.02])
+    """Half the width of the box around the design, as a share of the bounds [1]."""
     seed: int = Field(description="Of the sample.", examples=[1])
     variables: list[SampledVariableView] = Field(description="Varied variables.")
-    held: list[str] = Field(
-        description="Fixed variables: categorical ones, and integers whose next value is farther"
-        " than the radius.",
-        examples=[["FOMF"]],
-    )
+    held: list[str] = Field(examples=[["FOMF"]])
+    """Fixed variables: categorical ones, and integers whose next value is farther than the
+    radius."""
     objectives: list[ObjectiveView] = Field(description="Normalised objectives, f1 to f5.")
 
 

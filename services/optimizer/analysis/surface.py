@@ -18,22 +18,14 @@ from gaitswarm.sim.variables import VariableName, VariableValue
 class SurfaceRequest(Request):
     """A design of a fuzzy controller and the grid of its surfaces."""
 
-    design: dict[VariableName, VariableValue] = Field(
-        description="Value of each of the controller's variables; gait variables are ignored.",
-        examples=[PUBLISHED_DESIGN],
-    )
-    error_points: int = Field(
-        default=65, ge=3, le=129, description="Points of the grid over the error's range [1]."
-    )
-    current_points: int = Field(
-        default=33, ge=2, le=65, description="Points of the grid over the current's range [1]."
-    )
-    velocity_error: float = Field(
-        default=0.0,
-        ge=-1e7,
-        le=1e7,
-        description="Velocity error at which the surfaces of fuzzy-pi-3 are drawn [counts/s].",
-    )
+    design: dict[VariableName, VariableValue] = Field(examples=[PUBLISHED_DESIGN])
+    """Value of each of the controller's variables; gait variables are ignored."""
+    error_points: int = Field(default=65, ge=3, le=129)
+    """Points of the grid over the error's range [1]."""
+    current_points: int = Field(default=33, ge=2, le=65)
+    """Points of the grid over the current's range [1]."""
+    velocity_error: float = Field(default=0.0, ge=-1e7, le=1e7)
+    """Velocity error at which the surfaces of fuzzy-pi-3 are drawn [counts/s]."""
 
 
 class MembershipView(View):
@@ -48,14 +40,11 @@ class UniverseView(View):
 
     name: str = Field(description="error, current or velocity.", examples=["error"])
     unit: str = Field(description="Unit of range and values.", examples=["counts"])
-    range: tuple[float, float] = Field(
-        description="Ends of the universe: inputs saturate there, and an output's centroid is taken"
-        " over it, which may reach beyond the output's range."
-    )
-    values: list[float] = Field(
-        description="Points of the range; those of error and current are the surfaces' grid, in"
-        " whole counts."
-    )
+    range: tuple[float, float]
+    """Ends of the universe: inputs saturate there, and an output's centroid is taken over it, which
+    may reach beyond the output's range."""
+    values: list[float]
+    """Points of the range; those of error and current are the surfaces' grid, in whole counts."""
     memberships: list[MembershipView] = Field(description="Its fuzzy sets.")
 
 
@@ -82,28 +71,22 @@ class QuantisationView(View):
     velocity_bits: int | None = Field(description="Of the velocity error's index, if any [bit].")
     output_bits: int = Field(description="Of an entry [bit].", examples=[8])
     bytes: int = Field(description="Memory of the table (eq. 5.1) [B].", examples=[65536])
-    largest_difference: float = Field(
-        description="Of table and inference over the grid [unit of the output].", examples=[5.37]
-    )
-    rms_difference: float = Field(
-        description="Of table and inference over the grid [unit of the output].", examples=[2.07]
-    )
+    largest_difference: float = Field(examples=[5.37])
+    """Of table and inference over the grid [unit of the output]."""
+    rms_difference: float = Field(examples=[2.07])
+    """Of table and inference over the grid [unit of the output]."""
 
 
 class FuzzyOutputView(UniverseView):
     """An output with its rules, and its surface over error and current."""
 
-    name: str = Field(
-        description="Variable of the design that is its range: FOR's FO, FzzP or FzzI.",
-        examples=["FO"],
-    )
-    values: list[float] = Field(
-        description="Points over which the inference takes the centre of area."
-    )
+    name: str = Field(examples=["FO"])
+    """Variable of the design that is its range: FOR's FO, FzzP or FzzI."""
+    values: list[float]
+    """Points over which the inference takes the centre of area."""
     rules: list[RuleView] = Field(description="Its rules, in the thesis's order.")
-    inference: list[list[float]] = Field(
-        description="Exact inference: a row for each error, a number for each current."
-    )
+    inference: list[list[float]]
+    """Exact inference: a row for each error, a number for each current."""
     table: list[list[float]] = Field(description="The lookup table on the same grid.")
     quantisation: QuantisationView = Field(description="Resolution and error of the table.")
 
@@ -113,13 +96,11 @@ class SurfaceView(View):
 
     controller: ControllerName = Field(description="Controller.", examples=["fuzzy-pi"])
     inputs: list[UniverseView] = Field(description="All inputs of any output.")
-    velocity_error: float | None = Field(
-        description="At which the surfaces are drawn [counts/s], in whole counts a tick of 2 ms;"
-        " null if it is no input of the controller."
-    )
-    outputs: list[FuzzyOutputView] = Field(
-        description="fuzzy-pi has one, fuzzy-pi-3 the voltage FzzP and the integrated FzzI."
-    )
+    velocity_error: float | None
+    """At which the surfaces are drawn [counts/s], in whole counts a tick of 2 ms; null if it is no
+    input of the controller."""
+    outputs: list[FuzzyOutputView]
+    """fuzzy-pi has one, fuzzy-pi-3 the voltage FzzP and the integrated FzzI."""
 
 
 def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceView:

@@ -65,36 +65,19 @@ def reference_choice(text: str) -> ReferenceChoice:
 class Constraint(Data):
     """A limit on a quantity, in a scenario or in all."""
 
-    quantity: str = Field(
-        min_length=1,
-        max_length=100,
-        description="Measurement or objective; `*`, with `relative_to`: each of f1 to f5.",
-        examples=["speed"],
-    )
-    scenario: str = Field(
-        default=ALL,
-        min_length=1,
-        max_length=200,
-        description="Name of a scenario, or `*` for each.",
-        examples=["slope-fast"],
-    )
-    min: float | None = Field(
-        default=None,
-        description="Least value, in the quantity's unit; with `relative_to`, as a multiple of the"
-        " reference's value in the same scenario [1].",
-        examples=[0.05],
-    )
+    quantity: str = Field(min_length=1, max_length=100, examples=["speed"])
+    """Measurement or objective; `*`, with `relative_to`: each of f1 to f5."""
+    scenario: str = Field(default=ALL, min_length=1, max_length=200, examples=["slope-fast"])
+    """Name of a scenario, or `*` for each."""
+    min: float | None = Field(default=None, examples=[0.05])
+    """Least value, in the quantity's unit; with `relative_to`, as a multiple of the reference's
+    value in the same scenario [1]."""
     max: float | None = Field(default=None, description="Greatest value, likewise.")
-    relative_to: ReferenceChoice | None = Field(
-        default=None,
-        description="Reference: `published:NAME`, a published design of the controller; the id of a"
-        " job, whose best design is meant; or a design by name of its variables.",
-        examples=["published:A"],
-    )
-    reference: dict[str, dict[str, float]] | None = Field(
-        default=None,
-        description="Values of the reference, by case and quantity; simulated at submission.",
-    )
+    relative_to: ReferenceChoice | None = Field(default=None, examples=["published:A"])
+    """Reference: `published:NAME`, a published design of the controller; the id of a job, whose
+    best design is meant; or a design by name of its variables."""
+    reference: dict[str, dict[str, float]] | None = None
+    """Values of the reference, by case and quantity; simulated at submission."""
 
     @field_validator("relative_to")
     @classmethod

@@ -30,21 +30,15 @@ PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 class DesignRequest(Request):
     """A design and the robot that it drives."""
 
-    robot: RobotSource = Field(
-        default=DEFAULT_ROBOT,
-        description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " backlash, or the text of the files of your own.",
-    )
-    controller: ControllerName = Field(
-        default="fuzzy-pi",
-        description="Motor controller that drives it; see /v1/controllers.",
-    )
-    design: dict[VariableName, VariableValue] = Field(
-        description="Value of each of the controller's variables, and of any gait variable, which"
-        " then replaces the scenario's value; names and units as in /v1/controllers. A categorical"
-        " one takes a choice's name or index.",
-        examples=[PUBLISHED_DESIGN],
-    )
+    robot: RobotSource = DEFAULT_ROBOT
+    """Robot to simulate, by name, or a variant with another law of friction or with backlash, or
+    the text of the files of your own."""
+    controller: ControllerName = "fuzzy-pi"
+    """Motor controller that drives it; see /v1/controllers."""
+    design: dict[VariableName, VariableValue] = Field(examples=[PUBLISHED_DESIGN])
+    """Value of each of the controller's variables, and of any gait variable, which then replaces
+    the scenario's value; names and units as in /v1/controllers. A categorical one takes a choice's
+    name or index."""
 
     @model_validator(mode="after")
     def _design_fits(self) -> Self:
@@ -165,11 +159,9 @@ class WorldRequest(DesignRequest):
 class WalksRequest(ScenariosRequest):
     """A design and the scenarios in which to simulate it."""
 
-    precision: Precision = Field(
-        default="double",
-        description="Of the physics' numbers: `double`, or `single`, which is about twice as fast"
-        " and needs a C compiler.",
-    )
+    precision: Precision = "double"
+    """Of the physics' numbers: `double`, or `single`, which is about twice as fast and needs a C
+    compiler."""
 
     def check_walks(self) -> None:
         """Check every scenario before the first simulation."""
@@ -182,15 +174,10 @@ class WalksRequest(ScenariosRequest):
 class SimulationRequest(WalksRequest, WorldRequest):
     """A design, its scenarios, and how to judge it."""
 
-    preference: PreferenceChoice = Field(
-        default="A",
-        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
-        " your own.",
-    )
-    log: bool = Field(
-        default=False,
-        description="Whether to return the 500 Hz log of every scenario; logs are large.",
-    )
+    preference: PreferenceChoice = "A"
+    """How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or your own."""
+    log: bool = False
+    """Whether to return the 500 Hz log of every scenario; logs are large."""
 
     def resolved_preference(self) -> Preference:
         """The preference in full."""

@@ -240,20 +240,14 @@ class Reference(NamedTuple):
 class ReferenceView(View):
     """The design that a job's best is compared with."""
 
-    name: str = Field(
-        description="Study or preference for which it was published, `start design`, the id of a"
-        " job, or `given design`.",
-        examples=["A"],
-    )
-    kind: ReferenceKind = Field(
-        default="published",
-        description="`published`, or without one `start`: the middle of the job's bounds; on"
-        " request `job`, the best design of another one, or `design`.",
-    )
-    fitness: Finite = Field(
-        description="By the job's measure, in double precision [1]; null if it fails.",
-        examples=[20.72],
-    )
+    name: str = Field(examples=["A"])
+    """Study or preference for which it was published, `start design`, the id of a job, or `given
+    design`."""
+    kind: ReferenceKind = "published"
+    """`published`, or without one `start`: the middle of the job's bounds; on request `job`, the
+    best design of another one, or `design`."""
+    fitness: Finite = Field(examples=[20.72])
+    """By the job's measure, in double precision [1]; null if it fails."""
 
     @classmethod
     def from_reference(cls, reference: Reference | None) -> ReferenceView | None:

@@ -144,15 +144,10 @@ class AuditEntryView(View):
 
     index: int = Field(description="Index, increasing with time.", examples=[42])
     at: datetime = Field(description="When, UTC.")
-    actor: str = Field(
-        description="Name of the token; `local` for a client on the machine without one.",
-        examples=["ci"],
-    )
+    actor: str = Field(examples=["ci"])
+    """Name of the token; `local` for a client on the machine without one."""
     action: AuditAction = Field(description="The action.", examples=["cancel"])
-    job_id: str | None = Field(
-        description="The job, which may have been deleted since; null for none.",
-        examples=["k2q7zr5dm9xw"],
-    )
-    details: dict[str, Any] = Field(
-        description="Further content, such as the new budget.", examples=[{"iterations": 50}]
-    )
+    job_id: str | None = Field(examples=["k2q7zr5dm9xw"])
+    """The job, which may have been deleted since; null for none."""
+    details: dict[str, Any] = Field(examples=[{"iterations": 50}])
+    """Further content, such as the new budget."""

@@ -23,13 +23,10 @@ class EstimateView(View):
 
     evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
     walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
-    simulated_seconds: float = Field(
-        description="Simulated time in total [s]; less for designs that fall.", examples=[20250.0]
-    )
-    seconds: float | None = Field(
-        description="Wall time if it has the machine to itself [s]; null if unknown.",
-        examples=[21.5],
-    )
+    simulated_seconds: float = Field(examples=[20250.0])
+    """Simulated time in total [s]; less for designs that fall."""
+    seconds: float | None = Field(examples=[21.5])
+    """Wall time if it has the machine to itself [s]; null if unknown."""
     basis: str = Field(
         description="Basis of the estimate.",
         examples=[

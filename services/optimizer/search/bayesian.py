@@ -45,16 +45,11 @@ class BayesianSettings(SearchSettings):
     """Settings of Bayesian optimization."""
 
     name: Literal["bayesian"] = "bayesian"
-    sample: int = Field(
-        default=10, ge=2, le=10_000, description="Initial designs, a Latin hypercube."
-    )
+    sample: int = Field(default=10, ge=2, le=10_000)
+    """Initial designs, a Latin hypercube."""
     batch: int = Field(default=1, ge=1, le=1_000, description="Designs chosen by one model.")
-    handover: int = Field(
-        default=50,
-        ge=2,
-        le=500,
-        description="Evaluations after which CMA-ES continues from the best design.",
-    )
+    handover: int = Field(default=50, ge=2, le=500)
+    """Evaluations after which CMA-ES continues from the best design."""
 
 
 def bayesian(

@@ -32,30 +32,15 @@ class CmaEsSettings(SearchSettings):
     """Settings of CMA-ES."""
 
     name: Literal["cma-es"] = "cma-es"
-    population: int | None = Field(
-        default=None,
-        ge=4,
-        le=_LARGEST_POPULATION,
-        description="Designs of a generation. Default: 4 + 3 ln d, for d variables.",
-    )
-    sigma: float = Field(
-        default=0.25,
-        gt=0.0,
-        le=1.0,
-        description="Standard deviation at the start, as a share of each variable's range.",
-    )
-    growth: float = Field(
-        default=2.0,
-        ge=1.0,
-        le=10.0,
-        description="Factor of the population at each restart: 2 is IPOP, 1 keeps it.",
-    )
-    integers: Literal["widened", "centred"] = Field(
-        default="widened",
-        description="How integers keep changing. widened: by the smallest width of their"
-        " distribution. centred: around the values of good designs; better where most variables"
-        " are integers.",
-    )
+    population: int | None = Field(default=None, ge=4, le=_LARGEST_POPULATION)
+    """Designs of a generation. Default: 4 + 3 ln d, for d variables."""
+    sigma: float = Field(default=0.25, gt=0.0, le=1.0)
+    """Standard deviation at the start, as a share of each variable's range."""
+    growth: float = Field(default=2.0, ge=1.0, le=10.0)
+    """Factor of the population at each restart: 2 is IPOP, 1 keeps it."""
+    integers: Literal["widened", "centred"] = "widened"
+    """How integers keep changing. widened: by the smallest width of their distribution. centred:
+    around the values of good designs; better where most variables are integers."""
 
 
 class DistributionState(BaseModel):

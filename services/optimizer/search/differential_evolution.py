@@ -38,43 +38,22 @@ class DeSettings(SearchSettings):
     """Settings of differential evolution."""
 
     name: Literal["de"] = "de"
-    population: int = Field(
-        default=25, ge=4, le=10_000, description="Members of the population at the start."
-    )
-    population_end: int = Field(
-        default=4,
-        ge=4,
-        le=10_000,
-        description="Members at the end of the budget; their number falls linearly.",
-    )
-    best_share: float = Field(
-        default=0.1,
-        gt=0.0,
-        le=1.0,
-        description="Share of the best members that a member moves towards.",
-    )
-    archive: float = Field(
-        default=1.0,
-        ge=0.0,
-        le=10.0,
-        description="Size of the archive of replaced members, in populations.",
-    )
-    adaptation: Literal["success-history", "none"] = Field(
-        default="success-history",
-        description="Whether scale and crossover are learned from successful trials.",
-    )
-    memory: int = Field(
-        default=10, ge=1, le=1_000, description="Successful generations that are remembered."
-    )
-    scale: float = Field(
-        default=0.5, gt=0.0, le=1.0, description="Initial scale of differences, F."
-    )
-    crossover: float = Field(
-        default=0.9,
-        ge=0.0,
-        le=1.0,
-        description="Initial probability of a variable to be changed, CR.",
-    )
+    population: int = Field(default=25, ge=4, le=10_000)
+    """Members of the population at the start."""
+    population_end: int = Field(default=4, ge=4, le=10_000)
+    """Members at the end of the budget; their number falls linearly."""
+    best_share: float = Field(default=0.1, gt=0.0, le=1.0)
+    """Share of the best members that a member moves towards."""
+    archive: float = Field(default=1.0, ge=0.0, le=10.0)
+    """Size of the archive of replaced members, in populations."""
+    adaptation: Literal["success-history", "none"] = "success-history"
+    """Whether scale and crossover are learned from successful trials."""
+    memory: int = Field(default=10, ge=1, le=1_000)
+    """Successful generations that are remembered."""
+    scale: float = Field(default=0.5, gt=0.0, le=1.0)
+    """Initial scale of differences, F."""
+    crossover: float = Field(default=0.9, ge=0.0, le=1.0)
+    """Initial probability of a variable to be changed, CR."""
 
     @model_validator(mode="after")
     def _population_falls(self) -> DeSettings:

@@ -40,21 +40,14 @@ class HypeSettings(SearchSettings):
     name: Literal["hype"] = "hype"
     population: int = Field(default=40, ge=4, le=500, description="Members of the population.")
     offspring: int = Field(default=25, ge=1, le=500, description="New designs of each generation.")
-    scale_least: float = Field(
-        default=0.4, gt=0.0, le=1.0, description="Least scale of differences, F."
-    )
-    scale_most: float = Field(
-        default=0.9, gt=0.0, le=1.0, description="Greatest scale of differences, F."
-    )
-    crossover: float = Field(
-        default=0.9, ge=0.0, le=1.0, description="Chance of each variable to be changed, CR."
-    )
-    samples: int = Field(
-        default=4_000,
-        ge=100,
-        le=20_000,
-        description="Random points by which hypervolumes are estimated.",
-    )
+    scale_least: float = Field(default=0.4, gt=0.0, le=1.0)
+    """Least scale of differences, F."""
+    scale_most: float = Field(default=0.9, gt=0.0, le=1.0)
+    """Greatest scale of differences, F."""
+    crossover: float = Field(default=0.9, ge=0.0, le=1.0)
+    """Chance of each variable to be changed, CR."""
+    samples: int = Field(default=4_000, ge=100, le=20_000)
+    """Random points by which hypervolumes are estimated."""
 
     @model_validator(mode="after")
     def _scales_are_in_order(self) -> HypeSettings:

@@ -47,9 +47,8 @@ class SearchSettings(Data):
     """Settings that every method has."""
 
     name: str
-    particles: int = Field(
-        default=25, ge=1, le=10_000, description="Designs of one iteration, at most."
-    )
+    particles: int = Field(default=25, ge=1, le=10_000)
+    """Designs of one iteration, at most."""
 
 
 class Optimizer(Protocol):

@@ -38,26 +38,15 @@ class SwarmSettings(SearchSettings):
     social: float = Field(default=1.5, ge=0.0, le=10.0, description="Pull to the swarm's best.")
     inertia_start: float = Field(default=0.9, ge=0.0, le=2.0, description="Inertia at the start.")
     inertia_end: float = Field(default=0.9, ge=0.0, le=2.0, description="Inertia at the end.")
-    velocity_limit: float = Field(
-        default=0.5,
-        gt=0.0,
-        le=1.0,
-        description="Largest step, as a share of each variable's range.",
-    )
-    bounds: Literal["absorb", "reflect"] = Field(
-        default="reflect", description="What happens to a particle that leaves the box."
-    )
-    topology: Literal["global", "ring", "random"] = Field(
-        default="global",
-        description="Which particles inform a particle: all, both neighbours, or random ones that"
-        " change when the swarm's best does not improve.",
-    )
-    informants: int = Field(
-        default=3,
-        ge=1,
-        le=100,
-        description="Particles that each particle informs in the random topology.",
-    )
+    velocity_limit: float = Field(default=0.5, gt=0.0, le=1.0)
+    """Largest step, as a share of each variable's range."""
+    bounds: Literal["absorb", "reflect"] = "reflect"
+    """What happens to a particle that leaves the box."""
+    topology: Literal["global", "ring", "random"] = "global"
+    """Which particles inform a particle: all, both neighbours, or random ones that change when the
+    swarm's best does not improve."""
+    informants: int = Field(default=3, ge=1, le=100)
+    """Particles that each particle informs in the random topology."""
 
     @model_validator(mode="after")
     def _inertia_falls(self) -> Self:

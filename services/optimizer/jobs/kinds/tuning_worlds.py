@@ -55,28 +55,17 @@ _EDGE: Final = 1e-9
 class TuningWorlds(Data):
     """A set of worlds, shared by all designs and scenarios: common random numbers."""
 
-    count: int = Field(
-        default=8, ge=1, le=100, description="Number of worlds; every design is simulated in each."
-    )
-    seed: int = Field(
-        default=1, ge=0, lt=2**63, description="Seed of the worlds; see `seed` of a certificate."
-    )
-    ranges: tuple[VariableChoice, ...] | None = Field(
-        default=None,
-        min_length=1,
-        max_length=128,
-        description="Perturbations to draw: names, or variables with custom bounds. Default: all"
-        " but roughness.",
-    )
-    aggregate: Aggregate = Field(
-        default="cvar",
-        description="Aggregate of a scenario's utilities over all worlds: `mean`, `quantile` at"
-        " `level`, `worst`, or `cvar`, the conditional value at risk, which is the mean of the"
-        " worst 1 - `level` of them.",
-    )
-    level: float = Field(
-        default=0.75, ge=0.0, lt=1.0, description="Level of `quantile` and `cvar` [1]."
-    )
+    count: int = Field(default=8, ge=1, le=100)
+    """Number of worlds; every design is simulated in each."""
+    seed: int = Field(default=1, ge=0, lt=2**63)
+    """Seed of the worlds; see `seed` of a certificate."""
+    ranges: tuple[VariableChoice, ...] | None = Field(default=None, min_length=1, max_length=128)
+    """Perturbations to draw: names, or variables with custom bounds. Default: all but roughness."""
+    aggregate: Aggregate = "cvar"
+    """Aggregate of a scenario's utilities over all worlds: `mean`, `quantile` at `level`, `worst`,
+    or `cvar`, the conditional value at risk, which is the mean of the worst 1 - `level` of them."""
+    level: float = Field(default=0.75, ge=0.0, lt=1.0)
+    """Level of `quantile` and `cvar` [1]."""
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> Self:

@@ -24,14 +24,9 @@ from gaitswarm.api.documentation import problems
 from gaitswarm.api.events import Revocation
 from gaitswarm.api.page import HasManual
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
+from gaitswarm.services.optimizer import errors
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token
-from gaitswarm.services.optimizer.errors import (
-    Forbidden,
-    StoreUnavailable,
-    TooManyRequests,
-    Unauthorized,
-)
 from gaitswarm.services.optimizer.jobs.job import DEFAULT_PRIORITY, Quota
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.views.base import PREFIX
@@ -118,7 +113,7 @@ class TokenCache:
             async with self._watching:
                 try:
                     token = await self.find(secret)
-                except StoreUnavailable:
+                except errors.StoreUnavailable:
                     token = self.last(secret)
             if token is None:
                 return
@@ -185,7 +180,7 @@ class AccessMiddleware:
             return
         try:
             response = await self._refusal(scope, path)
-        except StoreUnavailable as error:
+        except errors.StoreUnavailable as error:
             _log.error("%r: %s", scope["path"], error)
             response = problem(scope["path"], "unavailable", error.for_clients)
         await (response or self.app)(scope, receive, send)
@@ -216,7 +211,7 @@ class AccessMiddleware:
         """fallback: used while the database is unavailable."""
         try:
             return await self._tokens.find(secret)
-        except StoreUnavailable:
+        except errors.StoreUnavailable:
             if fallback is None:
                 raise
             return fallback
@@ -258,7 +253,7 @@ def find_token(request: Request, tokens: Tokens, secret: str) -> Token | None:
     guesses, address = cast(TokenGuesses, request.app.state.guesses), address_of(request.scope)
     wait = guesses.seconds_to_wait(address)
     if wait > 0.0:
-        raise TooManyRequests("too many invalid tokens from this address", retry_after=wait)
+        raise errors.TooManyRequests("too many invalid tokens from this address", retry_after=wait)
     token = tokens.find(secret)
     if token is None:
         guesses.count(address)
@@ -286,7 +281,7 @@ async def may_submit(token: RequestToken) -> str | None:
     if token is None:
         return None
     if not token.scope.allows(TokenScope.SUBMIT):
-        raise Forbidden(
+        raise errors.Forbidden(
             f"the token {token.name!r} has scope `read`; use one of scope `submit` or `admin`"
         )
     return token.name
@@ -297,7 +292,7 @@ Owner = Annotated[str | None, Depends(may_submit)]
 
 async def may_administer(token: RequestToken) -> None:
     if token is not None and not token.scope.allows(TokenScope.ADMIN):
-        raise Forbidden(
+        raise errors.Forbidden(
             f"the token {token.name!r} has scope `{token.scope}`; use one of scope `admin`"
         )
 
@@ -310,7 +305,7 @@ def may_restore(job_id: JobId, service: Service, token: RequestToken) -> None:
 def may_command(job: ExistingJob, token: RequestToken) -> None:
     if token is not None and not token.may_command(job.owner):
         owner = "no owner" if job.owner is None else f"owner {job.owner!r}"
-        raise Forbidden(
+        raise errors.Forbidden(
             f"the token {token.name!r} of scope `{token.scope}` may not command this job, which has"
             f" {owner}; use the token that submitted it, or one of scope `admin`"
         )
@@ -333,7 +328,7 @@ def check_may_prioritize(token: Token | None, priority: int) -> None:
         and token is not None
         and not token.scope.allows(TokenScope.ADMIN)
     ):
-        raise Forbidden(
+        raise errors.Forbidden(
             f"the token {token.name!r} of scope `{token.scope}` may not set a priority above"
             f" {DEFAULT_PRIORITY}; use one of scope `admin`"
         )
@@ -408,7 +403,7 @@ def begin_session(
     """
     token = find_token(request, service.store.tokens, body.token)
     if token is None:
-        raise Unauthorized(UNKNOWN)
+        raise errors.Unauthorized(UNKNOWN)
     response.set_cookie(
         COOKIE,
         body.token,

@@ -17,28 +17,7 @@ from fastapi.responses import JSONResponse, StreamingResponse
 from fastapi.routing import APIRoute
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
-from gaitswarm.api.access import (
-    Owner,
-    OwnersQuota,
-    RequestToken,
-    UntilRevoked,
-    check_may_prioritize,
-    may_administer,
-    may_command,
-    may_restore,
-    may_submit,
-)
-from gaitswarm.api.dependencies import (
-    Computing,
-    ComputingCapacity,
-    ExistingJob,
-    FollowedJobs,
-    JobId,
-    ServerMetrics,
-    ServerSettings,
-    Service,
-    Stopping,
-)
+from gaitswarm.api import access, dependencies
 from gaitswarm.api.documentation import Responses, binary, problems
 from gaitswarm.api.events import EVENTS, EventsQuery, EventStream, job_events
 from gaitswarm.jobs.base import job_view
@@ -62,7 +41,7 @@ from gaitswarm.views.base import PREFIX
 from gaitswarm.views.job import JobView
 
 _PATH: Final[Mapping[str, Any]] = {
-    "job_id": JobId,
+    "job_id": dependencies.JobId,
     "iteration": Annotated[
         int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
     ],
@@ -93,10 +72,10 @@ _PATH: Final[Mapping[str, Any]] = {
 
 _ACCESS: Final[Mapping[str, list[Any]]] = {
     "read": [],
-    "submit": [Depends(may_submit)],
-    "command": [Depends(may_command)],
-    "restore": [Depends(may_restore)],
-    "admin": [Depends(may_administer)],
+    "submit": [Depends(access.may_submit)],
+    "command": [Depends(access.may_command)],
+    "restore": [Depends(access.may_restore)],
+    "admin": [Depends(access.may_administer)],
 }
 
 _IfNoneMatch = Annotated[
@@ -190,7 +169,10 @@ def _refusal(where: Location, problem: str, document: Any) -> RequestValidationE
 
 
 async def request_context(
-    request: Request, token: RequestToken, quota: OwnersQuota, settings: ServerSettings
+    request: Request,
+    token: access.RequestToken,
+    quota: access.OwnersQuota,
+    settings: dependencies.ServerSettings,
 ) -> Context:
     """Return what the server adds to the arguments of an operation."""
     limits = Limits(
@@ -202,7 +184,7 @@ async def request_context(
         actor=LOCAL if token is None else token.name,
         quota=quota,
         limits=limits,
-        check_priority=partial(check_may_prioritize, token),
+        check_priority=partial(access.check_may_prioritize, token),
         activity=request.state.activity,
         robots=settings.robots,
     )
@@ -214,7 +196,7 @@ def _endpoint(operation: Operation) -> Callable[..., Any]:
     async def answer(
         service: JobService,
         context: Context,
-        computing: ComputingCapacity,
+        computing: dependencies.ComputingCapacity,
         if_none_match: str | None = None,
         request: Any = None,
         **path: Any,
@@ -225,9 +207,9 @@ def _endpoint(operation: Operation) -> Callable[..., Any]:
         return await (computing.run(work) if operation.heavy else run_sync(work))
 
     kinds: dict[str, Any] = {
-        "service": Service,
+        "service": dependencies.Service,
         "context": Annotated[Context, Depends(request_context)],
-        "computing": Computing,
+        "computing": dependencies.Computing,
     } | {name: _PATH[name] for name in operation.path_names}
     if operation.request is not None and operation.method == "GET":
         kinds["request"] = Annotated[operation.request, Query()]
@@ -369,16 +351,16 @@ async def request_document(request: Request) -> Any:
 
 
 async def submission(
-    token: RequestToken,
-    owner: Owner,
-    quota: OwnersQuota,
-    settings: ServerSettings,
+    token: access.RequestToken,
+    owner: access.Owner,
+    quota: access.OwnersQuota,
+    settings: dependencies.ServerSettings,
     idempotency_key: IdempotencyKey = None,
     notify_url: NotifyUrl = None,
     priority: JobPriority = DEFAULT_PRIORITY,
 ) -> dict[str, Any]:
     """Return what accompanies a new job."""
-    check_may_prioritize(token, priority)
+    access.check_may_prioritize(token, priority)
     if notify_url is not None:
         check_url(notify_url, settings.webhook_hosts, field="Notify-URL")
     return {
@@ -443,7 +425,7 @@ router: Final = APIRouter(route_class=_Route)
 )
 def submit_job(
     spec: Annotated[AnySpec, Depends(validated(AnySpec, "spec"))],
-    service: Service,
+    service: dependencies.Service,
     response: Response,
     submission: Submission,
     sent: SentDocument,
@@ -469,9 +451,9 @@ def submit_job(
 )
 async def fork_job(
     fork: Annotated[ForkRequest, Depends(validated(ForkRequest, "fork"))],
-    job_id: JobId,
-    service: Service,
-    computing: Computing,
+    job_id: dependencies.JobId,
+    service: dependencies.Service,
+    computing: dependencies.Computing,
     response: Response,
     submission: Submission,
     sent: SentDocument,
@@ -503,13 +485,13 @@ async def fork_job(
     responses=EVENTS | problems(404, 422),
 )
 async def stream_events(
-    job: ExistingJob,
-    service: Service,
-    settings: ServerSettings,
-    topics: FollowedJobs,
-    stopping: Stopping,
-    metrics: ServerMetrics,
-    until_revoked: UntilRevoked,
+    job: dependencies.ExistingJob,
+    service: dependencies.Service,
+    settings: dependencies.ServerSettings,
+    topics: dependencies.FollowedJobs,
+    stopping: dependencies.Stopping,
+    metrics: dependencies.ServerMetrics,
+    until_revoked: access.UntilRevoked,
     query: Annotated[EventsQuery, Query()],
     last_event_id: Annotated[
         int | None,

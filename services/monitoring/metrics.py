@@ -11,14 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from prometheus_client import (
-    CollectorRegistry,
-    Counter,
-    Gauge,
-    Histogram,
-    ProcessCollector,
-    disable_created_metrics,
-)
+import prometheus_client
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.metrics_core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
@@ -64,14 +57,16 @@ class Metrics:
 
     def __init__(self) -> None:
         # Creation times would double the number of series.
-        disable_created_metrics()  # type: ignore[no-untyped-call]
+        prometheus_client.disable_created_metrics()  # type: ignore[no-untyped-call]
         self._lost: dict[tuple[str, int], None] = {}
         self._lock = threading.Lock()
-        self.registry = CollectorRegistry(auto_describe=False)
-        counter = partial(Counter, namespace=_NAMESPACE, registry=self.registry)
-        gauge = partial(Gauge, namespace=_NAMESPACE, registry=self.registry)
-        histogram = partial(Histogram, namespace=_NAMESPACE, registry=self.registry)
-        ProcessCollector(registry=self.registry)
+        self.registry = prometheus_client.CollectorRegistry(auto_describe=False)
+        counter = partial(prometheus_client.Counter, namespace=_NAMESPACE, registry=self.registry)
+        gauge = partial(prometheus_client.Gauge, namespace=_NAMESPACE, registry=self.registry)
+        histogram = partial(
+            prometheus_client.Histogram, namespace=_NAMESPACE, registry=self.registry
+        )
+        prometheus_client.ProcessCollector(registry=self.registry)
         version = gauge("build_info", "1, with the version of gaitswarm as a label", ["version"])
         version.labels(installed_version()).set(1)
         self.iterations = counter("iterations_committed_total", "Committed iterations", ["kind"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 S = TypeVar("S", bound=Spec)
 
 
+@dataclass(eq=False)
 class JobService:
     """Submit, control, read and analyze jobs. Thread-safe, as the store, which its owner closes.
 
@@ -52,20 +54,14 @@ class JobService:
     and simulated time of the references of constraints [s].
     """
 
-    def __init__(
-        self,
-        store: Store,
-        provenance: Callable[[Spec], JobProvenance] = job_provenance,
-        longest_job: float = math.inf,
-        longest_fork: float = math.inf,
-        longest_reference: float = math.inf,
-    ) -> None:
-        self.store = store
-        self.provenance = provenance
-        self.longest_job = longest_job
-        self.longest_fork = longest_fork
-        self.longest_reference = longest_reference
-        self._histories = HistoryCache(store)
+    store: Store
+    provenance: Callable[[Spec], JobProvenance] = job_provenance
+    longest_job: float = math.inf
+    longest_fork: float = math.inf
+    longest_reference: float = math.inf
+
+    def __post_init__(self) -> None:
+        self._histories = HistoryCache(self.store)
 
     def submit(
         self,

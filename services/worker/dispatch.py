@@ -10,16 +10,12 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
 
-from gaitswarm.services.optimizer.errors import (
-    EvaluatorUnavailable,
-    KilledWorker,
-    ProvenanceChanged,
-)
+from gaitswarm.services.optimizer import errors
 from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     EvaluationStopped,
@@ -244,33 +240,28 @@ class _Iteration:
         if self.request.on_task is None:
             return
         walks = len(run.chunk.cases) * (run.chunk.stop - run.chunk.start)
-        report = TaskReport(walks, time.monotonic() - run.begun, error=error)
-        if answer is not None:
-            report = replace(
-                report,
-                compute_seconds=answer.seconds,
-                kernel_time=answer.kernel_time,
-                table_seconds=answer.table_seconds,
-                host=answer.host,
-            )
+        seconds = time.monotonic() - run.begun
+        answer = answer or Answer(None, self.request.provenance, host="")
+        times = (answer.kernel_time, answer.table_seconds)
+        report = TaskReport(walks, seconds, answer.seconds, answer.host, error, *times)
         self.request.on_task(report)
 
 
-def unlike(host: str, refusal: str) -> ProvenanceChanged:
+def unlike(host: str, refusal: str) -> errors.ProvenanceChanged:
     """Return the error for a worker that computes something else."""
-    return ProvenanceChanged(
+    return errors.ProvenanceChanged(
         f"a worker on {host} does not compute what this job's results depend on: {refusal}. Its"
         " simulations were not used; install the same gaitswarm and a C compiler on all workers,"
         " and resume the job"
     )
 
 
-def killed_workers(request: EvaluationRequest, chunk: Chunk) -> KilledWorker:
+def killed_workers(request: EvaluationRequest, chunk: Chunk) -> errors.KilledWorker:
     """Return the error for a task of which workers die."""
     names = ", ".join(repr(request.cases[case].name) for case in chunk.cases)
     first, last = chunk.start, chunk.stop - 1
     designs = f"design {first}" if first == last else f"designs {first} to {last}"
-    return KilledWorker(
+    return errors.KilledWorker(
         f"{MOST_KILLED} worker processes died, one after the other, of the same task: {designs}"
         f" of the iteration in {names}. If their simulation is"
         " not at fault, the workers may lack memory; resume the job to try again"
@@ -477,4 +468,4 @@ class InProcessEvaluator:
     def check(self) -> None:
         """Raise EvaluatorUnavailable once closed."""
         if self._closed.is_set():
-            raise EvaluatorUnavailable("the evaluator was closed")
+            raise errors.EvaluatorUnavailable("the evaluator was closed")

@@ -146,11 +146,9 @@ def start(arguments: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str]) -> None:
-    match arguments:
-        case ["--check", port]:
-            sys.exit(not runs_here(int(port)))
-        case _:
-            start(arguments)
+    if arguments[:1] == ["--check"]:
+        sys.exit(not runs_here(int(arguments[1])))
+    start(arguments)
 
 
 if __name__ == "__main__":

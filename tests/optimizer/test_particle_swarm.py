@@ -136,11 +136,11 @@ def test_a_failure_never_becomes_a_best() -> None:
 def test_bounds_end_inside_the_box_however_far_outside_a_particle_is(
     x: float, low: float, span: float, handler: Callable[..., tuple[NDArray[np.float64], ...]]
 ) -> None:
-    bounds = np.array([low]), np.array([low + span])
-    (position, velocity) = handler(np.array([[x]]), np.array([[1.0]]), *bounds)
-    assert bounds[0] <= position[0, 0] <= bounds[1]
+    box = Space.continuous([low], [low + span])
+    (position, velocity) = handler(box, np.array([[x]]), np.array([[1.0]]))
+    assert box.low <= position[0, 0] <= box.high
     assert velocity[0, 0] in (-1.0, 0.0, 1.0)
-    if bounds[0] <= x <= bounds[1]:
+    if box.low <= x <= box.high:
         assert (position[0, 0], velocity[0, 0]) == (x, 1.0)
 
 
@@ -157,12 +157,13 @@ def test_bounds_end_inside_the_box_however_far_outside_a_particle_is(
 def test_a_reflected_particle_bounces_as_often_as_it_takes(
     x: float, expected: float, velocity: float
 ) -> None:
-    moved, turned = reflect(np.array([[x]]), np.ones((1, 1)), np.zeros(1), np.ones(1))
+    moved, turned = reflect(Space.continuous([0.0], [1.0]), np.array([[x]]), np.ones((1, 1)))
     assert (moved[0, 0], turned[0, 0]) == (expected, velocity)
 
 
 def test_an_absorbed_particle_stops_at_the_wall_in_that_direction_only() -> None:
-    moved, stopped = absorb(np.array([[1.5, 0.5]]), np.ones((1, 2)), np.zeros(2), np.ones(2))
+    box = Space.continuous([0.0, 0.0], [1.0, 1.0])
+    moved, stopped = absorb(box, np.array([[1.5, 0.5]]), np.ones((1, 2)))
     assert moved.tolist() == [[1.0, 0.5]] and stopped.tolist() == [[0.0, 1.0]]
 
 

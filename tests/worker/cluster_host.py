@@ -17,7 +17,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, ParamSpec, Self, TypeVar
 
-from gaitswarm.services.worker.ray_session import WORKER_ENVIRONMENT
+from gaitswarm.services.worker.ray_evaluator import WORKER_ENVIRONMENT
 from tests.examples.paths import ROOT
 
 P = ParamSpec("P")

@@ -34,7 +34,7 @@ def connect(address: str) -> None:
 
 def connect_from_elsewhere(address: str) -> None:
     """As from a machine that is no node of the cluster."""
-    with patch("gaitswarm.services.worker.ray_session.comes_here", lambda _host, _port: False):
+    with patch("gaitswarm.services.worker.ray_evaluator.comes_here", lambda _host, _port: False):
         connect(address)
 
 

@@ -14,8 +14,7 @@ from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidReq
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
 from gaitswarm.services.runtime import AutoEvaluator, open_evaluator
 from gaitswarm.services.worker.dispatch import InProcessEvaluator
-from gaitswarm.services.worker.ray_evaluator import RayEvaluator
-from gaitswarm.services.worker.ray_session import RaySession
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator, RaySession
 from tests.examples.processes import eventually
 from tests.worker.requests import bits, never, request, walked_at_once
 

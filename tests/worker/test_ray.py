@@ -71,7 +71,7 @@ def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continu
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """What Ray prints of it is logged, and not written among the answers of a command."""
-    caplog.set_level(logging.INFO, logger="gaitswarm.services.worker.ray_session")
+    caplog.set_level(logging.INFO, logger="gaitswarm.services.worker.ray_evaluator")
     wanted = request(1)
     walk = wanted.cases[0]
     assert isinstance(walk, Walk)

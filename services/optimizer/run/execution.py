@@ -14,16 +14,7 @@ from typing import TYPE_CHECKING, Final, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.errors import (
-    BudgetChanged,
-    GaitswarmError,
-    KilledWorker,
-    LeaseLost,
-    ProvenanceChanged,
-    StoreReplaced,
-    StoreUnavailable,
-    Unavailable,
-)
+from gaitswarm.services.optimizer import errors
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, JournalEntry
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -95,7 +86,7 @@ def _cached(
 ) -> dict[bytes, Outcome]:
     try:
         stored = store.known(keys)
-    except StoreUnavailable as error:
+    except errors.StoreUnavailable as error:
         _log.warning("job %s: simulating all designs without the cache: %s", request.job_id, error)
         return {}
     shapes = {(len(request.cases), len(case.objectives)) for case in request.cases}
@@ -108,28 +99,22 @@ def _cached(
     }
 
 
+@dataclass(eq=False)
 class Journal:
     """Evaluates the requests of a claimed job, without what an earlier run of it has stored."""
 
-    def __init__(
-        self,
-        claim: Claim,
-        store: Store,
-        evaluator: Evaluator,
-        *,
-        after_seconds: float = JOURNAL_SECONDS,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._claim = claim
-        self._store = store
-        self._evaluator = evaluator
-        self._after_seconds = after_seconds
-        self._clock = clock
+    claim: Claim
+    store: Store
+    evaluator: Evaluator
+    after_seconds: float = JOURNAL_SECONDS
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
         self._known: dict[tuple[int, bytes], tuple[NDArray[np.float64], int]] = {}
-        for entry in claim.journal:
+        for entry in self.claim.journal:
             self._know(entry)
         self._finished: list[JournalEntry] = []
-        self._is_stored = bool(claim.journal)
+        self._is_stored = bool(self.claim.journal)
         self._begun: float | None = None
         self._was_long = False
         self._writing = threading.Lock()
@@ -143,9 +128,9 @@ class Journal:
     ) -> tuple[Outcome, ...]:
         """Evaluate as `Evaluator.evaluate`; designs are identified by their keys."""
         if not keys:
-            return self._evaluator.evaluate(request, should_stop)
+            return self.evaluator.evaluate(request, should_stop)
         if self._begun is None:
-            self._begun = self._clock()
+            self._begun = self.clock()
         numbers, count = range(len(request.cases)), len(keys)
         known = self._known | {
             (number, key): (outcome.objectives[number], int(outcome.statuses[number]))
@@ -188,7 +173,7 @@ class Journal:
             of_designs = tuple(keys[first : first + len(outcome.statuses)])
             self._finished.append(JournalEntry(cases[case], of_designs, outcome))
 
-        return self._evaluator.evaluate(replace(request, on_outcome=on_outcome), should_stop)
+        return self.evaluator.evaluate(replace(request, on_outcome=on_outcome), should_stop)
 
     def store_finished(self) -> None:
         """Store what tasks have finished, if the iteration is a long one. Thread-safe."""
@@ -196,10 +181,10 @@ class Journal:
             begun, count = self._begun, len(self._finished)
             if begun is None or not count:
                 return
-            if self._was_long or self._clock() - begun > self._after_seconds:
+            if self._was_long or self.clock() - begun > self.after_seconds:
                 entries = self._finished[:count]
                 self._is_stored = True
-                self._store.journal(self._claim, entries)
+                self.store.journal(self.claim, entries)
                 del self._finished[:count]
                 for entry in entries:
                     self._know(entry)
@@ -208,7 +193,7 @@ class Journal:
         """Store nothing more of the iteration; return whether any of it is stored."""
         with self._writing:
             if self._begun is not None:
-                self._was_long = self._clock() - self._begun > self._after_seconds
+                self._was_long = self.clock() - self._begun > self.after_seconds
                 self._begun = None
             return self._is_stored
 
@@ -233,32 +218,24 @@ _LONGEST_INTERVAL: Final = 1.0
 _log = logging.getLogger(__name__)
 
 
+@dataclass(eq=False)
 class Heartbeat:
     """Renews a claim from its own thread, inside the `with` block; retries indefinitely."""
 
-    def __init__(
-        self,
-        store: Store,
-        claim: Claim,
-        *,
-        lease_seconds: float,
-        waiting: Callable[[], str | None] = lambda: None,
-        outage: Outage | None = None,
-        after_beat: Callable[[], None] = lambda: None,
-    ) -> None:
-        self._store = store
-        self._claim = claim
-        self._lease_seconds = lease_seconds
-        self._waiting = waiting
-        self._outage = outage or Outage()
-        self._after_beat = after_beat
-        self._interval = min(lease_seconds / _BEATS_PER_LEASE, _LONGEST_INTERVAL)
+    store: Store
+    claim: Claim
+    lease_seconds: float
+    waiting: Callable[[], str | None] = lambda: None
+    outage: Outage = field(default_factory=Outage)
+    after_beat: Callable[[], None] = lambda: None
+
+    def __post_init__(self) -> None:
+        job = self.claim.job
         self._ended = threading.Event()
         self._lost = threading.Event()
         # As of the last beat.
-        self.state, self.priority = claim.job.state, claim.job.priority
-        beat = log_context(job=claim.job.id)(self._beat)
-        name = f"heartbeat-{claim.job.id}"
+        self.state, self.priority = job.state, job.priority
+        beat, name = log_context(job=job.id)(self._beat), f"heartbeat-{job.id}"
         self._thread = threading.Thread(target=beat, name=name, daemon=True)
 
     @property
@@ -276,29 +253,30 @@ class Heartbeat:
 
     def _beat(self) -> None:
         failed = False
-        while not self._ended.wait(self._interval):
+        interval = min(self.lease_seconds / _BEATS_PER_LEASE, _LONGEST_INTERVAL)
+        while not self._ended.wait(interval):
             try:
-                renewal = self._store.renew(
-                    self._claim, lease_seconds=self._lease_seconds, waiting=self._waiting()
+                renewal = self.store.renew(
+                    self.claim, lease_seconds=self.lease_seconds, waiting=self.waiting()
                 )
                 self.state, self.priority = renewal.state, renewal.priority
-                self._after_beat()
-            except LeaseLost as error:
+                self.after_beat()
+            except errors.LeaseLost as error:
                 # A commit that ends the job releases the lease between two beats.
                 if not self._ended.is_set():
-                    _log.info("job %s: %s", self._claim.job.id, error)
+                    _log.info("job %s: %s", self.claim.job.id, error)
                 self._lost.set()
                 return
             except Exception as error:
                 if not is_infrastructure(error):
                     raise
                 failed = True
-                if self._outage.failed(str(error)):
-                    _log.warning("job %s: no heartbeat: %s", self._claim.job.id, error)
+                if self.outage.failed(str(error)):
+                    _log.warning("job %s: no heartbeat: %s", self.claim.job.id, error)
             else:
                 # A beat sent before another access failed does not end its outage.
                 if failed:
-                    self._outage.ended()
+                    self.outage.ended()
                 failed = False
 
 
@@ -350,35 +328,31 @@ def run_claim(
             state, actions = run.begin()
             while actions:
                 state, actions = run.proceed(state, actions)
-    except StoreUnavailable:
+    except errors.StoreUnavailable:
         raise
     except BaseException:
-        with suppress(GaitswarmError):
+        with suppress(errors.GaitswarmError):
             context.store.release(claim, JobState.QUEUED)
         raise
     return context.store.job(claim.job.id)
 
 
+@dataclass(eq=False)
 class _Run:
-    def __init__(
-        self, claim: Claim, context: RunContext, stop: threading.Event, drain: threading.Event
-    ) -> None:
-        self.claim = claim  # that of the heartbeat, with the job as last read
-        self.context = context
-        self.stop = stop
-        self.drain = drain
-        self.worker_outage, self.store_outage = Outage(context.clock), Outage(context.clock)
-        self.journal = Journal(
-            claim,
-            context.store,
-            context.evaluator,
-            after_seconds=context.journal_seconds,
-            clock=context.clock,
-        )
+    claim: Claim  # that of the heartbeat, with the job as last read
+    context: RunContext
+    stop: threading.Event
+    drain: threading.Event
+
+    def __post_init__(self) -> None:
+        store, clock = self.context.store, self.context.clock
+        self.worker_outage, self.store_outage = Outage(clock), Outage(clock)
+        evaluator, seconds = self.context.evaluator, self.context.journal_seconds
+        self.journal = Journal(self.claim, store, evaluator, after_seconds=seconds, clock=clock)
         self.heartbeat = Heartbeat(
-            context.store,
-            claim,
-            lease_seconds=context.lease_seconds,
+            store,
+            self.claim,
+            lease_seconds=self.context.lease_seconds,
             waiting=lambda: self.worker_outage.reason,
             outage=self.store_outage,
             after_beat=self.journal.store_finished,
@@ -417,11 +391,11 @@ class _Run:
             for action in actions:
                 with log_context(iteration=iteration_of(action)):
                     answer = self._do(action)
-        except LeaseLost:
+        except errors.LeaseLost:
             return Signal.LEASE_LOST
         except EvaluationStopped:
             return self._stopped()
-        except BudgetChanged:
+        except errors.BudgetChanged:
             try:
                 job = self._stored(lambda: self.context.store.job(self.claim.job.id))
             except EvaluationStopped:
@@ -479,7 +453,7 @@ class _Run:
             )
         except EvaluationStopped:
             raise
-        except (KilledWorker, ProvenanceChanged) as error:
+        except (errors.KilledWorker, errors.ProvenanceChanged) as error:
             _log.warning("job %s: %s", request.job_id, error)
             return EvaluationFailed(str(error))
         except Exception as error:  # noqa: BLE001
@@ -529,7 +503,7 @@ class _Run:
         while True:
             try:
                 return access()
-            except StoreReplaced:
+            except errors.StoreReplaced:
                 raise
             except Exception as error:
                 if not is_infrastructure(error):
@@ -568,4 +542,5 @@ class _Run:
 
 
 def _in_words(error: Exception) -> str:
-    return str(error) if isinstance(error, Unavailable) else f"{type(error).__name__}: {error}"
+    is_known = isinstance(error, errors.Unavailable)
+    return str(error) if is_known else f"{type(error).__name__}: {error}"

@@ -10,6 +10,7 @@ import time
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from gaitswarm.services.optimizer.errors import (
@@ -23,13 +24,8 @@ from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, 
 from gaitswarm.services.optimizer.jobs.listing import Page, every
 from gaitswarm.services.optimizer.jobs.provenance import optimizer_digest
 from gaitswarm.services.optimizer.log_context import log_context
+from gaitswarm.services.optimizer.run import execution
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
-from gaitswarm.services.optimizer.run.execution import (
-    Heartbeat,
-    OnRetry,
-    RunContext,
-    run_claim,
-)
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
 from gaitswarm.sim.provenance import simulator_digest
 
@@ -58,35 +54,28 @@ def runner_name() -> str:
     return f"{socket.gethostname()}:{os.getpid()}:{uuid.uuid4().hex[:8]}"
 
 
+@dataclass(eq=False)
 class Runner:
     """Runs up to `concurrency` jobs, each in its own thread, from start() to stop()."""
 
-    def __init__(
-        self,
-        store: Store,
-        evaluator: Evaluator,
-        *,
-        concurrency: int = 2,
-        lease_seconds: float = 30.0,
-        poll_seconds: float = 0.5,
-        cache: bool = False,
-        quarantine_after: int = QUARANTINE_AFTER,
-        name: str | None = None,
-        on_ended: Callable[[Job], object] | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        if concurrency < 1:
-            raise ValueError(f"concurrency must be at least 1, it is {concurrency}")
-        self._context = RunContext(store, evaluator, lease_seconds=lease_seconds, cache=cache)
-        self._poll_seconds = poll_seconds
-        self._quarantine_after = quarantine_after
-        self._name = name or runner_name()
-        self._on_ended = on_ended
-        self._clock = clock
+    store: Store
+    evaluator: Evaluator
+    concurrency: int = 2
+    lease_seconds: float = 30.0
+    poll_seconds: float = 0.5
+    cache: bool = False
+    quarantine_after: int = QUARANTINE_AFTER
+    name: str = field(default_factory=runner_name)
+    on_ended: Callable[[Job], object] | None = None
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
+        if self.concurrency < 1:
+            raise ValueError(f"concurrency must be at least 1, it is {self.concurrency}")
         self._drain = threading.Event()
         self._stop = threading.Event()
-        self._polled_at = clock()
-        self._room = threading.Semaphore(concurrency)
+        self._polled_at = self.clock()
+        self._room = threading.Semaphore(self.concurrency)
         self._scheduler: threading.Thread | None = None
         self._jobs: set[threading.Thread] = set()
         self._outage = Outage()
@@ -101,7 +90,7 @@ class Runner:
             return None
         if not self.running:
             return "it has ended and runs no more jobs; restart this process"
-        silent = self._clock() - self._polled_at
+        silent = self.clock() - self._polled_at
         if silent > STUCK_SECONDS:
             return f"it has not polled for jobs for {silent:.0f} s; restart it if this persists"
         return None
@@ -120,8 +109,8 @@ class Runner:
         """Let every job commit its iteration in progress and return to the queue, then stop."""
         hurry = at_once or threading.Event()
         self._drain.set()
-        until = self._clock() + seconds
-        while (left := until - self._clock()) > 0.0 and self._busy:
+        until = self.clock() + seconds
+        while (left := until - self.clock()) > 0.0 and self._busy:
             if hurry.wait(min(left, _GLANCE)):
                 break
         self.stop()
@@ -142,13 +131,13 @@ class Runner:
 
     def _schedule(self) -> None:
         while not self._drain.is_set():
-            self._polled_at = self._clock()
-            if not self._room.acquire(timeout=self._poll_seconds):
+            self._polled_at = self.clock()
+            if not self._room.acquire(timeout=self.poll_seconds):
                 continue
             claim = self._claim()
             if claim is None or not self._started(claim):
                 self._room.release()
-                self._drain.wait(self._poll_seconds)
+                self._drain.wait(self.poll_seconds)
 
     def _started(self, claim: Claim) -> bool:
         """Run a job in its own thread; False if it was returned to the queue."""
@@ -169,14 +158,14 @@ class Runner:
 
     def _give_back(self, claim: Claim) -> None:
         with suppress(GaitswarmError):
-            self._context.store.release(claim, JobState.QUEUED)
+            self.store.release(claim, JobState.QUEUED)
 
     def _claim(self) -> Claim | None:
         try:
-            claim = self._context.store.claim(
-                self._name,
-                lease_seconds=self._context.lease_seconds,
-                quarantine_after=self._quarantine_after,
+            claim = self.store.claim(
+                self.name,
+                lease_seconds=self.lease_seconds,
+                quarantine_after=self.quarantine_after,
             )
         except Exception as error:  # noqa: BLE001
             if not is_infrastructure(error):
@@ -198,11 +187,14 @@ class Runner:
         # The job stays as last committed; the next claim continues from there.
         with log_context(job=claim.job.id):
             try:
-                job = run_claim(claim, self._context, self._stop, self._drain)
+                context = execution.RunContext(
+                    self.store, self.evaluator, lease_seconds=self.lease_seconds, cache=self.cache
+                )
+                job = execution.run_claim(claim, context, self._stop, self._drain)
                 iterations = job.progress.iterations
                 _log.info("job %s: %s after %d iterations", job.id, job.state, iterations)
-                if self._on_ended is not None and not self._stop.is_set():
-                    self._on_ended(job)
+                if self.on_ended is not None and not self._stop.is_set():
+                    self.on_ended(job)
             except NotFound as error:
                 _log.info("job %s was deleted: %s", claim.job.id, error)
             except Exception as error:  # noqa: BLE001
@@ -246,7 +238,7 @@ def run_embedded(  # noqa: C901 - one loop
     job: str | Claim,
     *,
     on_iteration: OnIteration | None = None,
-    on_retry: OnRetry | None = None,
+    on_retry: execution.OnRetry | None = None,
     on_news: OnNews | None = None,
     stop: threading.Event | None = None,
     accepts_changes: bool = False,
@@ -297,7 +289,7 @@ def run_embedded(  # noqa: C901 - one loop
         except EvaluationStopped:
             latest, claim = store.job(job_id), None
             continue
-        context = RunContext(
+        context = execution.RunContext(
             store,
             opened,
             lease_seconds=EMBEDDED_LEASE_SECONDS,
@@ -306,7 +298,7 @@ def run_embedded(  # noqa: C901 - one loop
             accepts_changes=accepts_changes,
             cache=cache,
         )
-        latest, claim = run_claim(claim, context, stop), None
+        latest, claim = execution.run_claim(claim, context, stop), None
         # A new holder has taken the job from this process.
         news, following = _TAKEN, False
     if claim is not None:
@@ -325,7 +317,7 @@ def run_embedded(  # noqa: C901 - one loop
 def _opened(store: Store, evaluator: Callable[[], Evaluator], claim: Claim) -> Evaluator:
     """Open the evaluator, keeping the lease meanwhile; queue the job on failure."""
     try:
-        with Heartbeat(store, claim, lease_seconds=EMBEDDED_LEASE_SECONDS):
+        with execution.Heartbeat(store, claim, lease_seconds=EMBEDDED_LEASE_SECONDS):
             return evaluator()
     except BaseException:
         with suppress(GaitswarmError):

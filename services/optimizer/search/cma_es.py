@@ -10,13 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, PositiveFloat
 
-from gaitswarm.services.optimizer.search.optimizer import (
-    Fitness,
-    Generational,
-    GenerationState,
-    Numbers,
-    SearchSettings,
-)
+from gaitswarm.services.optimizer.search import optimizer as base
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, normal_quantiles
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
@@ -28,7 +22,7 @@ _RESTART: Final = 6
 _LARGEST_POPULATION: Final = 10_000
 
 
-class CmaEsSettings(SearchSettings):
+class CmaEsSettings(base.SearchSettings):
     """Settings of CMA-ES."""
 
     name: Literal["cma-es"] = "cma-es"
@@ -48,16 +42,16 @@ class DistributionState(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, defer_build=True)
 
-    mean: Numbers  # (d,)
+    mean: base.Numbers  # (d,)
     sigma: PositiveFloat  # overall standard deviation
-    scale: Numbers  # (d,) factors of `sigma`
-    correlation: Numbers  # (d, d)
-    sigma_path: Numbers  # (d,) evolution paths
-    correlation_path: Numbers
-    scale_path: Numbers
+    scale: base.Numbers  # (d,) factors of `sigma`
+    correlation: base.Numbers  # (d, d)
+    sigma_path: base.Numbers  # (d,) evolution paths
+    correlation_path: base.Numbers
+    scale_path: base.Numbers
     weights: list[FiniteFloat]
     """Share of the steady state that each of the three paths has reached."""
-    chances: list[Numbers]
+    chances: list[base.Numbers]
     """Probabilities of the choices, by categorical variable."""
 
     @classmethod
@@ -79,20 +73,19 @@ class DistributionState(BaseModel):
     @property
     def shapes(self) -> dict[str, Any]:
         """Lengths of all lists."""
-        return {name: np.shape(value) for name, value in self if name != "chances"} | {
-            "chances": [len(chances) for chances in self.chances]
-        }
+        shapes: dict[str, Any] = {k: np.shape(value) for k, value in self if k != "chances"}
+        return shapes | {"chances": [len(chances) for chances in self.chances]}
 
 
-class _CmaEsState(GenerationState):
+class _CmaEsState(base.GenerationState):
     restarts: NonNegativeInt
     """Number of distributions before the current one."""
-    bests: Fitness
+    bests: base.Fitness
     """Least fitness of the latest generations."""
     distribution: DistributionState
 
 
-class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
+class CmaEs(base.Generational[CmaEsSettings, _CmaEsState]):
     """A normal distribution that adapts to the better half of its samples.
 
     dd-CMA-ES (Akimoto and Hansen 2020): the scales of the variables are learned separately from
@@ -124,13 +117,10 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
 
     @property
     def distribution(self) -> NormalDistribution:
-        if self._distribution is None or self._distribution.state is not self.state.distribution:
-            self._distribution = NormalDistribution(
-                self.space,
-                self.population,
-                self.state.distribution,
-                centres=self.settings.integers == "centred",
-            )
+        state, centres = self.state.distribution, self.settings.integers == "centred"
+        if self._distribution is None or self._distribution.state is not state:
+            distribution = NormalDistribution(self.space, self.population, state, centres=centres)
+            self._distribution = distribution
         return self._distribution
 
     def propose(self) -> Floats:

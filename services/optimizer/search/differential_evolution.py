@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
-from gaitswarm.services.optimizer.search.optimizer import (
-    Fitness,
-    Generational,
-    GenerationState,
-    Numbers,
-    Points,
-    SearchSettings,
-)
+from gaitswarm.services.optimizer.search import optimizer as base
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
@@ -34,7 +27,7 @@ _CONVERGED: Final = 1e-9
 """Extent of a population, as a share of each variable's range, below which it restarts."""
 
 
-class DeSettings(SearchSettings):
+class DeSettings(base.SearchSettings):
     """Settings of differential evolution."""
 
     name: Literal["de"] = "de"
@@ -62,22 +55,22 @@ class DeSettings(SearchSettings):
         return self
 
 
-class _PopulationState(GenerationState):
+class _PopulationState(base.GenerationState):
     """State of a population, which is empty before its first generation is evaluated."""
 
     began: NonNegativeInt
     """Evaluations before this population."""
-    members: Points
-    member_fitness: Fitness
-    archive: Points
+    members: base.Points
+    member_fitness: base.Fitness
+    archive: base.Points
     """Positions that were replaced."""
-    scales: Numbers
-    crossovers: Numbers
+    scales: base.Numbers
+    crossovers: base.Numbers
     successes: NonNegativeInt
     """Number of successful generations."""
 
 
-class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
+class DifferentialEvolution(base.Generational[DeSettings, _PopulationState]):
     """A population in which each member is replaced by its trial if that is no worse.
 
     L-SHADE (Tanabe and Fukunaga, CEC 2014): current-to-pbest/1 with an archive, binomial crossover,
@@ -131,10 +124,10 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
             if getattr(state, name).shape != (length,):
                 raise ValueError(f"{name}: expected {length} of them")
         judged, asked = len(state.fitness), len(state.positions)
-        # The first generation may be of more start positions than there are members.
-        whole = {size or settings.population} | (
-            {len(self._start)} if not state.generations else set()
-        )
+        whole = {size or settings.population}
+        if not state.generations:
+            # It may be of more start positions than there are members.
+            whole.add(len(self._start))
         if judged < asked and asked not in whole:
             raise ValueError(f"positions: {asked} of them under way for {size} members")
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from gaitswarm.services.optimizer.search import optimizer as base
 from gaitswarm.services.optimizer.search.differential_evolution import (
     crossed,
     has_converged,
@@ -15,14 +16,6 @@ from gaitswarm.services.optimizer.search.differential_evolution import (
     latin_hypercube,
     with_choices,
     without_duplicates,
-)
-from gaitswarm.services.optimizer.search.optimizer import (
-    Fitness,
-    Generational,
-    GenerationState,
-    Points,
-    SearchSettings,
-    checked_fitness,
 )
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.arrays import Floats
@@ -34,7 +27,7 @@ _SAMPLE: Final = 8
 """Purposes of random streams: never renumbered, or stored jobs would change their future."""
 
 
-class HypeSettings(SearchSettings):
+class HypeSettings(base.SearchSettings):
     """Settings of HypE."""
 
     name: Literal["hype"] = "hype"
@@ -56,15 +49,15 @@ class HypeSettings(SearchSettings):
         return self
 
 
-class _PopulationState(GenerationState):
+class _PopulationState(base.GenerationState):
     """State of a population, which is empty before its first generation is evaluated."""
 
-    members: Points
-    vectors: Fitness
+    members: base.Points
+    vectors: base.Fitness
     """Objective vectors of the members."""
 
 
-class Hype(Generational[HypeSettings, _PopulationState]):
+class Hype(base.Generational[HypeSettings, _PopulationState]):
     """A population whose members together dominate the largest hypervolume.
 
     Selection is that of HypE (Bader and Zitzler 2011): of members and trials together, complete
@@ -90,7 +83,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         known = self.state.vectors if len(self.state.vectors) else self.state.fitness
         first = known if len(known) else fitness
         objectives = first.shape[1] if first.ndim > 1 else 1
-        return checked_fitness(fitness, self.state.asked, max(1, objectives))
+        return base.checked_fitness(fitness, self.state.asked, max(1, objectives))
 
     def propose(self) -> Floats:
         random = RandomNumbers(self.seed, _VARY, iteration=self.state.generations)

@@ -10,15 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
-from gaitswarm.services.optimizer.search.optimizer import (
-    Fitness,
-    Generational,
-    GenerationState,
-    Numbers,
-    Points,
-    SearchSettings,
-)
+from gaitswarm.services.optimizer.search import optimizer as base
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 
 _SCATTER: Final = 1
@@ -30,7 +24,7 @@ _INITIAL_VELOCITY: Final = 0.1
 """Share of each variable's range."""
 
 
-class SwarmSettings(SearchSettings):
+class SwarmSettings(base.SearchSettings):
     """Settings of a swarm's motion, for methods that have a swarm."""
 
     particles: int = Field(default=25, ge=1, le=10_000, description="Size of the swarm.")
@@ -61,17 +55,17 @@ class PsoSettings(SwarmSettings):
     name: Literal["pso"] = "pso"
 
 
-class _SwarmState(GenerationState):
+class _SwarmState(base.GenerationState):
     """State of a swarm; `best_fitness` is +inf for a particle that has not succeeded yet."""
 
-    velocities: Numbers
-    best_positions: Points
-    best_fitness: Fitness
+    velocities: base.Numbers
+    best_positions: base.Points
+    best_fitness: base.Fitness
     informed_since: NonNegativeInt = 0
     """Generation whose random numbers determine the informants."""
 
 
-class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
+class ParticleSwarm(base.Generational[SwarmSettings, _SwarmState]):
     """A swarm that remembers the best position of each particle.
 
     It moves in the continuous box, in the variables' own units. Positions stay real in integer
@@ -153,9 +147,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         fastest = settings.velocity_limit * space.span
         velocities = np.clip(velocities, -fastest, fastest)
         at_bounds = absorb if settings.bounds == "absorb" else reflect
-        moved, state.velocities = at_bounds(
-            positions + velocities, velocities, space.low, space.high
-        )
+        moved, state.velocities = at_bounds(space, positions + velocities, velocities)
         return moved
 
     def _leaders(self) -> NDArray[np.intp]:
@@ -165,13 +157,8 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
             return np.full(particles, np.argmin(fitness))
         if self.settings.topology == "ring":
             return leaders(ring(particles), fitness)
-        draws = swarm_uniform(
-            self.seed,
-            _INFORM,
-            iteration=self.state.informed_since,
-            particles=particles,
-            count=self.settings.informants,
-        )
+        since, count = self.state.informed_since, self.settings.informants
+        draws = swarm_uniform(self.seed, _INFORM, iteration=since, particles=particles, count=count)
         return leaders(random_informants(draws), fitness)
 
     def _inertia(self) -> float:
@@ -190,33 +177,21 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         return draws[:, :d], draws[:, d:]
 
 
-def absorb(
-    positions: Floats,
-    velocities: Floats,
-    low: Floats,
-    high: Floats,
-) -> tuple[Floats, Floats]:
+def absorb(space: Space, positions: Floats, velocities: Floats) -> tuple[Floats, Floats]:
     """Stop particles at the walls."""
-    inside = np.clip(positions, low, high)
+    inside = np.clip(positions, space.low, space.high)
     return inside, np.where(inside == positions, velocities, 0.0)
 
 
-def reflect(
-    positions: Floats,
-    velocities: Floats,
-    low: Floats,
-    high: Floats,
-) -> tuple[Floats, Floats]:
+def reflect(space: Space, positions: Floats, velocities: Floats) -> tuple[Floats, Floats]:
     """Reflect particles at the walls, repeatedly if needed."""
-    span = high - low
+    low, high, span = space.low, space.high, space.span
     outside = (positions < low) | (positions > high)
     phase = np.mod(positions - low, 2.0 * span)
     odd = phase > span
     folded = np.clip(low + np.where(odd, 2.0 * span - phase, phase), low, high)
-    return (
-        np.where(outside, folded, positions),
-        np.where(outside & odd, -velocities, velocities),
-    )
+    turned = np.where(outside & odd, -velocities, velocities)
+    return np.where(outside, folded, positions), turned
 
 
 Links = tuple[NDArray[np.intp], NDArray[np.intp]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias, Union
 
@@ -26,17 +27,8 @@ from gaitswarm.services.optimizer.search.optimizer import (
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim import plugins
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.plugins import (
-    MISSING,
-    KnownName,
-    Plugin,
-    PluginSettings,
-    Registry,
-    check_is,
-    check_name,
-    version_of,
-)
 
 Create = Callable[[Any, Space, int, int], Optimizer]
 """(settings, space, budget [evaluations], seed) -> an optimizer before its first ask."""
@@ -65,12 +57,14 @@ class Method:
 
     def versions(self) -> dict[str, str]:
         """Return the installed versions of its libraries, "none" for a missing one."""
-        return {name: version_of(name) for name in self.libraries}
+        return {name: plugins.version_of(name) for name in self.libraries}
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Libraries that are not installed."""
-        return tuple(name for name, version in self.versions().items() if version == MISSING)
+        return tuple(
+            name for name, version in self.versions().items() if version == plugins.MISSING
+        )
 
     @property
     def remedy(self) -> str:
@@ -96,14 +90,10 @@ def from_generator(
             parameter `start`, None by default, receives a `Start`: evaluated designs to begin from.
         libraries: As in `Method`.
     """
-
-    def create(settings: SearchSettings, space: Space, budget: int, seed: int) -> Optimizer:
-        return Replayed(search, settings, space, budget, seed)
-
     return Method(
         settings,
         summary,
-        create,
+        partial(Replayed, search),
         replays=True,
         uses_start="start" in inspect.signature(search).parameters,
         libraries=libraries,
@@ -216,14 +206,14 @@ _IN_RESEARCH: Final = (
 """Methods of the package gaitswarm-research, in the folder research/."""
 
 
-def _accepted(plugin: Plugin, brought: object) -> Method:
-    method = check_is(plugin, brought, Method)
-    check_name(plugin, method.settings.model_fields["name"].default)
+def _accepted(plugin: plugins.Plugin, brought: object) -> Method:
+    method = plugins.check_is(plugin, brought, Method)
+    plugins.check_name(plugin, method.settings.model_fields["name"].default)
     # A job resumes only with the same version of the distribution that brings its method.
     return replace(method, libraries=(plugin.distribution, *method.libraries))
 
 
-METHODS: Final = Registry[Method](
+METHODS: Final = plugins.Registry[Method](
     "optimizer",
     _BUILT_IN,
     _accepted,
@@ -251,7 +241,7 @@ else:
             custom_error_type="no_choice",
             custom_error_message="must be a name or an object with settings",
         ),
-        PluginSettings(METHODS, attrgetter("settings"), "/v1/optimizers"),
+        plugins.PluginSettings(METHODS, attrgetter("settings"), "/v1/optimizers"),
     ]
     """Settings of any method, distinguished by their `name`."""
 
@@ -299,7 +289,7 @@ class NamedSettings(Mapping[str, SearchSettings]):
 
 OPTIMIZERS: Final = NamedSettings()
 
-OptimizerName: TypeAlias = Annotated[str, KnownName(OPTIMIZERS)]
+OptimizerName: TypeAlias = Annotated[str, plugins.KnownName(OPTIMIZERS)]
 
 
 def create_search(

@@ -16,14 +16,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 import sqlalchemy as sa
-from sqlalchemy.exc import (
-    ArgumentError,
-    DatabaseError,
-    InterfaceError,
-    InternalError,
-    OperationalError,
-)
-from sqlalchemy.exc import TimeoutError as PoolTimeout
+from sqlalchemy import exc
 
 from gaitswarm.services.optimizer.access import HARMLESS, masked_url
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreReplaced, StoreUnavailable
@@ -72,7 +65,7 @@ def parse_url(text: str) -> sa.URL:
         raise StoreUnavailable(f"the database URL is empty; {forms}")
     try:
         url = sa.make_url(text) if "://" in text else sa.URL.create("sqlite", database=text)
-    except (ArgumentError, ValueError) as error:
+    except (exc.ArgumentError, ValueError) as error:
         raise StoreUnavailable(f"the database URL cannot be understood; {forms}") from error
     if url.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
         return url.set(drivername="postgresql+psycopg")
@@ -194,12 +187,12 @@ class Database:
         driver = self.engine.dialect.loaded_dbapi.Error
         try:
             yield
-        except (DatabaseError, InterfaceError, PoolTimeout, driver) as error:
+        except (exc.DatabaseError, exc.InterfaceError, exc.TimeoutError, driver) as error:
             # InternalError: a PostgreSQL server that became read-only or ended the session. A bare
             # DatabaseError: a file or an answer that is not a database's. The driver's own: rows
             # that cannot be fetched.
-            faults = (OperationalError, InterfaceError, InternalError, PoolTimeout, driver)
-            if not isinstance(error, faults) and type(error) is not DatabaseError:
+            faults = (exc.OperationalError, exc.InterfaceError, exc.InternalError, exc.TimeoutError)
+            if not isinstance(error, (*faults, driver)) and type(error) is not exc.DatabaseError:
                 raise
             cause = self.without_secrets(_cause(error))
             raise StoreUnavailable(f"database {self.name}: {cause}") from error

@@ -40,15 +40,8 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     fitness_summary,
 )
 from gaitswarm.services.optimizer.jobs.listing import Page, checked_limit
+from gaitswarm.services.optimizer.store import job_rows
 from gaitswarm.services.optimizer.store.engine import Aggregate
-from gaitswarm.services.optimizer.store.job_rows import (
-    chain_documents,
-    job_row,
-    parsed,
-    provenance_document,
-    require_job,
-    to_job,
-)
 from gaitswarm.services.optimizer.store.tables import (
     Row,
     evaluations,
@@ -88,7 +81,7 @@ class History(Aggregate):
             .limit(limit + 1)
         )
         with self._database.read("iterations") as connection:
-            require_job(connection, job_id)
+            job_rows.require_job(connection, job_id)
             rows = connection.execute(query).mappings().all()
         return Page.of([Iteration(**row) for row in rows], limit, lambda last: str(last.index))
 
@@ -107,13 +100,13 @@ class History(Aggregate):
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
         """Return the designs of `evaluations_between` as columns; None if there are none."""
         with self._database.read("evaluation_columns") as connection:
-            require_job(connection, job_id)
+            job_rows.require_job(connection, job_id)
             return _select_columns(connection, job_id, first, last)
 
     def best(self, job_id: str) -> Evaluation | None:
         """Return the earliest design of least fitness in double precision, with reevaluation."""
         with self._database.read("best") as connection:
-            require_job(connection, job_id)
+            job_rows.require_job(connection, job_id)
             place = select(jobs.c.best_iteration, jobs.c.best_particle).where(jobs.c.id == job_id)
             iteration, particle = connection.execute(place).one()
             if iteration is None:
@@ -137,7 +130,7 @@ class History(Aggregate):
     ) -> tuple[tuple[int, Reevaluation], ...]:
         """Return the reevaluations of a range of iterations, each after its iteration's index."""
         with self._database.read("reevaluations") as connection:
-            require_job(connection, job_id)
+            job_rows.require_job(connection, job_id)
             return _select_reevaluations(connection, job_id, first, last)
 
     def known(self, keys: Sequence[bytes]) -> dict[bytes, Outcome]:
@@ -157,7 +150,7 @@ class History(Aggregate):
     def chain_documents(self, job_id: str) -> ChainDocuments:
         """Return the documents other than iterations that a job's chain depends on, as stored."""
         with self._database.read("chain_documents") as connection:
-            return chain_documents(job_row(connection, job_id))
+            return job_rows.chain_documents(job_rows.job_row(connection, job_id))
 
     def links(self, job_id: str, first: int, last: int) -> tuple[Link, ...]:
         """Return a range of iterations, including the current one; ValueError for a damaged one."""
@@ -310,7 +303,7 @@ def complete_iteration(
     link = Link(done.iteration, _floats(row.positions, row.designs), row.ask_digest)
     previous = _at(job["id"], done.iteration - 1)
     connection.execute(update(iterations).where(previous).values(optimizer_state={}))
-    changes, results = _results(job, chain_documents(job), link, done, now)
+    changes, results = _results(job, job_rows.chain_documents(job), link, done, now)
     (committed,) = results.pop(iterations)
     connection.execute(update(iterations).where(_at(job["id"], done.iteration)), committed)
     for table, rows in results.items():
@@ -406,9 +399,11 @@ def take_history(
     connection: Connection, job: Row, lineage: Lineage, taken: TakenHistory, now: datetime
 ) -> dict[str, Any]:
     """Commit the parent's iterations to a fork, which then no longer depends on the parent."""
-    parent, end, spec = lineage.parent, lineage.from_iteration, to_job(job).spec
-    provenance = provenance_document(taken.provenance)
-    documents = ChainDocuments(parsed(job["spec"]), parsed(job["lineage"]), provenance)
+    parent, end, spec = lineage.parent, lineage.from_iteration, job_rows.to_job(job).spec
+    provenance = job_rows.provenance_document(taken.provenance)
+    documents = ChainDocuments(
+        job_rows.parsed(job["spec"]), job_rows.parsed(job["lineage"]), provenance
+    )
     changes: dict[str, Any] = {
         "provenance": provenance,
         "accepts_changes": taken.accepts_changes,

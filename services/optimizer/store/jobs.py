@@ -13,12 +13,7 @@ from typing import Any, Final
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from gaitswarm.services.optimizer.errors import (
-    Conflict,
-    IdempotencyConflict,
-    InvalidRequest,
-    NotFound,
-)
+from gaitswarm.services.optimizer import errors
 from gaitswarm.services.optimizer.jobs.documents import check_budget
 from gaitswarm.services.optimizer.jobs.fork import Fork
 from gaitswarm.services.optimizer.jobs.job import (
@@ -140,7 +135,7 @@ class Jobs(Aggregate):
         key, digest = idempotency_key, None
         if key is not None:
             if not (0 < len(key) <= _LONGEST_KEY and key.isprintable()):
-                raise InvalidRequest(
+                raise errors.InvalidRequest(
                     f"an idempotency key has 1 to {_LONGEST_KEY} printable characters",
                     field="idempotency_key",
                 )
@@ -197,8 +192,10 @@ class Jobs(Aggregate):
                 try:
                     # It must not be deleted while it is copied.
                     job_row(connection, parent, lock=True)
-                except NotFound as error:
-                    raise Conflict(f"job {parent} that was to be forked was deleted") from error
+                except errors.NotFound as error:
+                    raise errors.Conflict(
+                        f"job {parent} that was to be forked was deleted"
+                    ) from error
             columns = {
                 **columns,
                 "parent_id": parent,
@@ -246,10 +243,8 @@ class Jobs(Aggregate):
 
         A job whose lease has expired is paused at once, and queued if resumed. Cancelling clears
         the lease, so the runner's next write is refused. Raises Conflict if the state does not
-        allow the command, and Unreadable if an unreadable job would be queued.
-
-        accept_changes: whether a resumed job may continue under a changed provenance. quota: of the
-        owner's unfinished jobs, if an ended job is queued again.
+        allow the command, and Unreadable if an unreadable job would be queued. The quota is checked
+        if an ended job is queued again.
         """
         with self._database.write("command") as connection:
             row, now = job_row(connection, job_id, lock=True), self._clock(connection)
@@ -317,7 +312,7 @@ class Jobs(Aggregate):
             row = job_row(connection, job_id, lock=True)
             state = JobState(row["state"])
             if state.terminal:
-                raise Conflict(f"cannot prioritize a job that is {state}; it has ended")
+                raise errors.Conflict(f"cannot prioritize a job that is {state}; it has ended")
             now, action = self._clock(connection), AuditAction.PRIORITIZE
             note_change(connection, now, actor, action, job_id, priority=priority)
             return to_job(update_job(connection, row, {"priority": priority}))
@@ -360,12 +355,12 @@ class Jobs(Aggregate):
             row = job_row(connection, job_id, lock=True)
             state = JobState(row["state"])
             if state not in DELETABLE:
-                raise Conflict(
+                raise errors.Conflict(
                     f"cannot delete a job that is {state}; cancel it first: `gaitswarm cancel"
                     f" {job_id}`, or POST /v1/jobs/{job_id}/cancel"
                 )
             if row["kept"]:
-                raise Conflict(
+                raise errors.Conflict(
                     "cannot delete a job that is kept; release it first: `gaitswarm keep --release"
                     f" {job_id}`, or DELETE /v1/jobs/{job_id}/keep"
                 )
@@ -389,7 +384,7 @@ class Jobs(Aggregate):
         query = query.with_for_update() if lock else query
         row = connection.execute(query).mappings().first() if is_job_id(job_id) else None
         if row is None:
-            raise NotFound(f"no job {job_id!r} was deleted in the last 24 hours")
+            raise errors.NotFound(f"no job {job_id!r} was deleted in the last 24 hours")
         return row
 
     def clock_jump(self) -> timedelta | None:
@@ -518,9 +513,9 @@ class Jobs(Aggregate):
             since = connection.scalar(sa.select(sa.func.min(jobs.c.updated_at)).where(*queued))
             beginning = sa.func.substr(sa.func.coalesce(jobs.c.error, ""), 1, _ERROR_LENGTH)
             failed = sa.select(beginning).where(jobs.c.state == JobState.FAILED, EXISTING)
-            errors = tuple(connection.execute(failed).scalars())
+            failures = tuple(connection.execute(failed).scalars())
         wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
-        return Queue(by_state, under_way, wait, errors)
+        return Queue(by_state, under_way, wait, failures)
 
 
 def _repeated_job(
@@ -538,7 +533,7 @@ def _repeated_job(
     if row["request_digest"] == digest or (submitted == spec and job.lineage == lineage):
         return job
     what = "the different job" if job.readable else "a job that cannot be read and compared,"
-    raise IdempotencyConflict(
+    raise errors.IdempotencyConflict(
         f"idempotency key {key!r} was used before, for {what} {row['id']}; use a new key for a new"
         " job"
     )

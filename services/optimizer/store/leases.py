@@ -22,26 +22,8 @@ from gaitswarm.services.optimizer.jobs.job import (
 from gaitswarm.services.optimizer.jobs.listing import storable
 from gaitswarm.services.optimizer.jobs.provenance import RECORDS, JobProvenance, with_record
 from gaitswarm.services.optimizer.jobs.time_left import recent_pace
+from gaitswarm.services.optimizer.store import history, job_rows
 from gaitswarm.services.optimizer.store.engine import Aggregate
-from gaitswarm.services.optimizer.store.history import (
-    answered_ask,
-    complete_iteration,
-    insert_ask,
-    insert_entries,
-    journal_of,
-    open_ask,
-)
-from gaitswarm.services.optimizer.store.job_rows import (
-    COLUMNS,
-    entering,
-    job_row,
-    parsed,
-    provenance_document,
-    require_job,
-    to_job,
-    unreadable,
-    update_job,
-)
 from gaitswarm.services.optimizer.store.recordings import load_recordings
 from gaitswarm.services.optimizer.store.tables import Row, jobs, journal
 
@@ -70,19 +52,18 @@ class Leases(Aggregate):
         of them keeps others from being claimed. A lease that expires without release counts as a
         crash until the next commit or resumption. Returns None if there is no job to claim.
 
-        job_id: the only job to claim; None for any. quarantine_after: consecutive crashes after
-        which a job fails.
+        job_id: the only job to claim; None for any.
         """
         claim = None
         with self._database.write("claim") as connection:
             if job_id is not None:
-                require_job(connection, job_id)
+                job_rows.require_job(connection, job_id)
             now = self._clock(connection)
             abandoned = and_(
                 jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING)), not_(has_live_lease(now))
             )
             query = (
-                select(*COLUMNS)
+                select(*job_rows.COLUMNS)
                 .where(or_(jobs.c.state == JobState.QUEUED, abandoned))
                 .order_by(jobs.c.priority.desc(), jobs.c.created_at, jobs.c.id)
                 .limit(1)
@@ -112,31 +93,31 @@ class Leases(Aggregate):
             reason = None if waiting is None else storable(waiting)
             if reason != row["waiting"]:
                 changes |= {"waiting": reason, "updated_at": now}
-            update_job(connection, row, changes)
+            job_rows.update_job(connection, row, changes)
             return Renewal(JobState(row["state"]), row["priority"])
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
         """Record the provenance from the next iteration on, and clear the acceptance of changes."""
         with self._held("record_provenance", claim) as (connection, row):
-            stored = parsed(row["provenance"]) or ()
+            stored = job_rows.parsed(row["provenance"]) or ()
             before = RECORDS.validate_python(stored)
             added = with_record(before, row["iterations"], provenance)[len(before) :]
             # Earlier records stay as written, as digests depend on them.
-            document = [*stored, *provenance_document(added)]
-            update_job(connection, row, {"provenance": document, "accepts_changes": False})
+            document = [*stored, *job_rows.provenance_document(added)]
+            job_rows.update_job(connection, row, {"provenance": document, "accepts_changes": False})
 
     def begin(self, claim: Claim, ask: Ask) -> None:
         """Store the ask of a new or extended job. Idempotent. Raises BudgetChanged and Conflict."""
         with self._held("begin", claim) as (connection, row):
-            if open_ask(connection, row) is None:
+            if history.open_ask(connection, row) is None:
                 _require_budget(claim, row)
                 now = self._clock(connection)
-                insert_ask(connection, row, ask, expected=row["iterations"], now=now)
+                history.insert_ask(connection, row, ask, expected=row["iterations"], now=now)
 
     def journal(self, claim: Claim, entries: Sequence[JournalEntry]) -> None:
         """Store outcomes of finished tasks of the open ask; later claims bring them."""
         with self._held("journal", claim) as (connection, row):
-            insert_entries(connection, row, entries)
+            history.insert_entries(connection, row, entries)
 
     def commit(
         self,
@@ -151,26 +132,23 @@ class Leases(Aggregate):
         Returns the job's state afterwards: succeeded at the end of the budget; paused, without a
         lease, if it was pausing; otherwise unchanged. Raises BudgetChanged if the job's budget is
         not the claim's, on which `following` depends, and Conflict if the iteration was not asked.
-
-        following: the next ask; None at the end of the budget. journaled: whether to clear the
-        journal.
         """
         with self._held("commit", claim, committed=done.iteration) as (connection, row):
             if done.iteration < row["iterations"]:
                 return JobState(row["state"])
             now = self._clock(connection)
             _require_budget(claim, row)
-            progress = _progress(row, done) | complete_iteration(connection, row, done, now)
+            progress = _progress(row, done) | history.complete_iteration(connection, row, done, now)
             if journaled:
                 connection.execute(delete(journal).where(journal.c.job_id == row["id"]))
             if following is not None:
-                insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
+                history.insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
             state = JobState(row["state"])
             if following is None:
                 state = JobState.SUCCEEDED
             elif state is JobState.PAUSING:
                 state = JobState.PAUSED
-            update_job(connection, row, entering(state, now) | progress)
+            job_rows.update_job(connection, row, job_rows.entering(state, now) | progress)
         for observer in self._database.observers:
             observer.committed(claim, done, state)
         return state
@@ -183,8 +161,8 @@ class Leases(Aggregate):
             pausing = row["state"] == JobState.PAUSING and state is JobState.QUEUED
             text = storable(error) if error is not None else row["error"]
             after = JobState.PAUSED if pausing else state
-            changes = entering(after, self._clock(connection)) | {"error": text}
-            update_job(connection, row, changes)
+            changes = job_rows.entering(after, self._clock(connection)) | {"error": text}
+            job_rows.update_job(connection, row, changes)
         for observer in self._database.observers:
             observer.released(claim, state, error)
 
@@ -205,7 +183,7 @@ class Leases(Aggregate):
 
 def _claimed_row(connection: Connection, claim: Claim, committed: int | None) -> Row:
     try:
-        row = job_row(connection, claim.job.id, lock=True)
+        row = job_rows.job_row(connection, claim.job.id, lock=True)
     except NotFound:
         lost = f"{claim.runner} has lost job {claim.job.id}: it was deleted"
         raise LeaseLost(lost) from None
@@ -240,7 +218,7 @@ def _take_or_end(
 ) -> Claim | None:
     """Take a locked job that can be claimed, or pause or fail it."""
     if row["state"] == JobState.PAUSING:
-        update_job(connection, row, entering(JobState.PAUSED, now))
+        job_rows.update_job(connection, row, job_rows.entering(JobState.PAUSED, now))
         return None
     owner = row["lease_owner"]
     crashes = row["crashes"] + (owner is not None and owner != runner)
@@ -250,15 +228,15 @@ def _take_or_end(
             f" they ran its iteration {row['iterations']}, the last of them {owner}. See there"
             " what ended it, such as a lack of memory; resume the job to try again"
         )
-        columns = entering(JobState.FAILED, now) | {"error": error, "crashes": crashes}
-        update_job(connection, row, columns)
+        columns = job_rows.entering(JobState.FAILED, now) | {"error": error, "crashes": crashes}
+        job_rows.update_job(connection, row, columns)
         return None
     try:
         return take_job(connection, row, runner, lease_seconds, now, crashes=crashes)
     except Unreadable as error:
         _log.warning("job %s is set aside: %s", row["id"], error)
-        columns = entering(JobState.FAILED, now) | {"error": storable(str(error))}
-        update_job(connection, row, columns)
+        columns = job_rows.entering(JobState.FAILED, now) | {"error": storable(str(error))}
+        job_rows.update_job(connection, row, columns)
         return None
 
 
@@ -272,33 +250,35 @@ def take_job(
     crashes: int = 0,
 ) -> Claim:
     """Lease a locked job under a higher token. Raises Unreadable, and changes nothing."""
-    spec = to_job(row).stored_spec
+    spec = job_rows.to_job(row).stored_spec
     if isinstance(spec, UnreadableSpec):
         raise Unreadable(spec.reason)
     try:
         walks = load_recordings(connection, spec.recording_ids)
-        ask = open_ask(connection, row)
-        answered = answered_ask(connection, row) if ask is None else None
-        journal = () if ask is None else journal_of(connection, row)
+        ask = history.open_ask(connection, row)
+        answered = history.answered_ask(connection, row) if ask is None else None
+        journal = () if ask is None else history.journal_of(connection, row)
     except NotFound as error:
-        raise unreadable(str(error)) from error
+        raise job_rows.unreadable(str(error)) from error
     except (ValueError, TypeError, LookupError, RecursionError) as error:
-        raise unreadable(f"its iteration {row['iterations']} cannot be read ({error})") from error
+        raise job_rows.unreadable(
+            f"its iteration {row['iterations']} cannot be read ({error})"
+        ) from error
     owner, token = row["lease_owner"], row["lease_token"] + 1
-    changes = entering(JobState.RUNNING, now) | {
+    changes = job_rows.entering(JobState.RUNNING, now) | {
         "started_at": row["started_at"] or now,
         "lease_owner": runner,
         "lease_token": token,
         "crashes": crashes,
         **_lease(now, lease_seconds),
     }
-    job = to_job(update_job(connection, row, changes))
+    job = job_rows.to_job(job_rows.update_job(connection, row, changes))
     taken_from = None if owner == runner else owner
     return Claim(job, runner, token, ask, walks, answered, taken_from, journal)
 
 
 def _require_budget(claim: Claim, row: Row) -> None:
-    budget = to_job(row).stored_spec.iterations
+    budget = job_rows.to_job(row).stored_spec.iterations
     if budget != claim.job.spec.iterations:
         raise BudgetChanged(f"job {row['id']} is to run {budget} iterations now")
 

@@ -20,16 +20,9 @@ from sqlalchemy import JSON, URL, Connection, Text, bindparam, cast, delete, fun
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
-from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store import Store, schema
 from gaitswarm.services.optimizer.store.engine import Database, database_time, parse_url
 from gaitswarm.services.optimizer.store.jobs import TRASH
-from gaitswarm.services.optimizer.store.schema import (
-    check_revision,
-    create,
-    exclusive,
-    lock_file,
-    upgrade,
-)
 from gaitswarm.services.optimizer.store.tables import jobs, metadata, recordings
 
 _ROWS_AT_ONCE: Final = 1000
@@ -66,7 +59,7 @@ def restore(url: str, file: Path, *, overwrite: bool = False) -> None:
     folder = Path(tempfile.gettempdir()) if target is None else target.parent
     with _temporary_file(folder, f"backup {file}") as copy:
         _copy_file(file, copy)
-        if upgrade(str(copy)) is None:
+        if schema.upgrade(str(copy)) is None:
             raise InvalidRequest(f"{file} is no backup of gaitswarm", field="FILE")
         if target is None:
             _fill_server(parsed, copy, overwrite=overwrite)
@@ -98,12 +91,12 @@ def _copy_file(source: Path, target: Path) -> None:
 
 
 def _fill_server(url: URL, copy: Path, *, overwrite: bool) -> None:
-    create(url)
+    schema.create(url)
     with (
         closing(Database(str(copy), for_migration=True)) as source,
         closing(Database(url, for_migration=True)) as target,
         source.read() as rows,
-        exclusive(target) as to,
+        schema.exclusive(target) as to,
     ):
         tables = metadata.sorted_tables
         filled = [table.name for table in tables if to.execute(select(table).limit(1)).first()]
@@ -119,7 +112,7 @@ def _fill_server(url: URL, copy: Path, *, overwrite: bool) -> None:
 def _fill_file(url: URL, target: Path, copy: Path) -> None:
     if target.exists():
         try:
-            with closing(Database(url, for_migration=True)) as database, exclusive(database):
+            with closing(Database(url, for_migration=True)) as database, schema.exclusive(database):
                 pass
         except StoreUnavailable as error:
             raise StoreUnavailable(
@@ -130,7 +123,7 @@ def _fill_file(url: URL, target: Path, copy: Path) -> None:
         closing(sqlite3.connect(target, isolation_level=None)) as to,
     ):
         with closing(to.cursor()) as cursor:
-            lock_file(cursor, str(target))
+            schema.lock_file(cursor, str(target))
         # One transaction into the same file: a process that waits for it opens the restored one.
         from_.backup(to)
 
@@ -161,7 +154,7 @@ def check(url: str) -> list[str]:
     """Return damage of an SQLite file, which may be in use; at most 20 findings of each kind."""
     findings: list[str] = []
     with closing(Database(url, for_migration=True)) as database:
-        check_revision(database)
+        schema.check_revision(database)
         with database.read() as connection:
             if database.path is not None:
                 pages = connection.exec_driver_sql(f"PRAGMA integrity_check({_MOST_FINDINGS})")
@@ -193,7 +186,7 @@ def prune(
 ) -> Pruned:
     """Remove old jobs, as `Store.delete_ended_before`, old audit entries and unused recordings."""
     with closing(Database(url, for_migration=True)) as database:
-        check_revision(database)
+        schema.check_revision(database)
         store = Store(database)
         with database.read() as connection:
             now = database_time(connection)

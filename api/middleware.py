@@ -8,6 +8,7 @@ import socket
 import time
 import uuid
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Final
 from urllib.parse import urlsplit
@@ -60,15 +61,15 @@ _HEADERS: Final = {
 }
 
 
+@dataclass(eq=False)
 class ResponseMiddleware:
     """Finish every response: request id, security headers, metrics, and unexpected exceptions.
 
     A client's own id is kept if it has 1 to 128 letters, digits, `_`, `.` or `-`.
     """
 
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self.app = app
-        self._metrics = metrics
+    app: ASGIApp
+    metrics: Metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -113,8 +114,8 @@ class ResponseMiddleware:
     def _count(self, scope: Scope, status: int, seconds: float) -> None:
         method = scope["method"] if scope["method"] in _METHODS else "other"
         route = getattr(scope.get("route"), "path", None) or _NO_ROUTE
-        self._metrics.http_requests.labels(method, route, str(status)).inc()
-        self._metrics.http_seconds.labels(method, route).observe(seconds)
+        self.metrics.http_requests.labels(method, route, str(status)).inc()
+        self.metrics.http_seconds.labels(method, route).observe(seconds)
 
 
 class OriginMiddleware:
@@ -170,13 +171,13 @@ class OriginMiddleware:
         return bool(host) and (host == headers.get("host", "").lower() or host in self._allowed)
 
 
+@dataclass(eq=False)
 class BodyLimitMiddleware:
     """Reject bodies over a limit, larger at some paths, with or without a declared length."""
 
-    def __init__(self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int]) -> None:
-        self.app = app
-        self.max_bytes = max_bytes
-        self.larger = larger
+    app: ASGIApp
+    max_bytes: int
+    larger: Mapping[str, int]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":

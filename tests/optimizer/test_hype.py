@@ -17,8 +17,7 @@ from gaitswarm.services.optimizer.search.hype import (
     SampledHypervolume,
     pareto_ranks,
 )
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.space import Axis, RandomNumbers, Space
 
 Floats = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationCo
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import WEIGHED_NAMES
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import RandomNumbers
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.variables import Variable

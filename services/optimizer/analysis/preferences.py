@@ -38,7 +38,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
 )
 from gaitswarm.services.optimizer.jobs.labels import OWN, preference_name
 from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceChoice
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import RandomNumbers
 from gaitswarm.services.optimizer.views import (
     DesignValues,
     Finite,

@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.jobs.sensitivity import (
     slopes_and_squares,
     usable_rows,
 )
-from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.search.space import swarm_uniform
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.catalogue import design_catalogue, design_shown

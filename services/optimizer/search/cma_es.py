@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, PositiveFloat
 
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, normal_quantiles
-from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.space import RandomNumbers, Space, normal_quantiles
 from gaitswarm.sim.arrays import Floats
 
 _SAMPLE: Final = 5

@@ -8,16 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from gaitswarm.services.optimizer.search import differential_evolution as de
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.differential_evolution import (
-    crossed,
-    has_converged,
-    indices,
-    latin_hypercube,
-    with_choices,
-    without_duplicates,
-)
-from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import RandomNumbers
 from gaitswarm.sim.arrays import Floats
 
 Indices = NDArray[np.intp]
@@ -88,7 +81,7 @@ class Hype(base.Generational[HypeSettings, _PopulationState]):
     def propose(self) -> Floats:
         random = RandomNumbers(self.seed, _VARY, iteration=self.state.generations)
         if not len(self.state.members):
-            return latin_hypercube(self.space, self.settings.population, random)
+            return de.latin_hypercube(self.space, self.settings.population, random)
         return self._trials(random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
@@ -98,7 +91,7 @@ class Hype(base.Generational[HypeSettings, _PopulationState]):
         vectors = np.concatenate([state.vectors, fitness]) if len(state.vectors) else fitness
         kept = self.best(vectors, min(len(pool), self.settings.population))
         state.members, state.vectors = pool[kept], vectors[kept]
-        if has_converged(self.space, state.members):
+        if de.has_converged(self.space, state.members):
             self.begin()
 
     def best(self, fitness: Floats, count: int) -> Indices:
@@ -136,16 +129,16 @@ class Hype(base.Generational[HypeSettings, _PopulationState]):
         n, m = settings.offspring, len(members)
         places = self._places()
         own, towards = (self._winners(places, random) for _ in range(2))
-        one, other = (members[indices(random.uniform(n), m)] for _ in range(2))
+        one, other = (members[de.indices(random.uniform(n), m)] for _ in range(2))
         least, most = settings.scale_least, settings.scale_most
         scale = least + (most - least) * random.uniform(n, 1)
         parents, best = members[own], members[towards]
         # Clipped to the bounds: the best designs often lie at some.
         moved = parents + scale * (best - parents) + scale * (one - other)
         mutants = np.clip(moved, space.low, space.high)
-        mutants = with_choices(space, mutants, (best, one, other), random)
-        trials = crossed(parents, mutants, np.full(n, settings.crossover), random)
-        return without_duplicates(space, members, trials, random)
+        mutants = de.with_choices(space, mutants, (best, one, other), random)
+        trials = de.crossed(parents, mutants, np.full(n, settings.crossover), random)
+        return de.without_duplicates(space, members, trials, random)
 
     def _places(self) -> Indices:
         """Return (m,) places of the members, 0 the best: by front, then by share of it."""
@@ -160,7 +153,7 @@ class Hype(base.Generational[HypeSettings, _PopulationState]):
     def _winners(self, places: Indices, random: RandomNumbers) -> Indices:
         """Return (offspring,) winners of two random members each."""
         n, m = self.settings.offspring, len(places)
-        one, other = indices(random.uniform(n), m), indices(random.uniform(n), m)
+        one, other = de.indices(random.uniform(n), m), de.indices(random.uniform(n), m)
         return np.where(places[one] <= places[other], one, other)
 
 

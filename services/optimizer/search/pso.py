@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
-from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.space import Space, swarm_uniform
 from gaitswarm.sim.arrays import Floats
 
 _SCATTER: Final = 1

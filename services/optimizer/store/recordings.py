@@ -13,16 +13,7 @@ from sqlalchemy import Connection, func, insert, select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import NotFound
-from gaitswarm.services.optimizer.jobs.listing import (
-    LOCAL,
-    AuditAction,
-    Page,
-    RecordingEntry,
-    checked_limit,
-    folded,
-    from_cursor,
-    to_cursor,
-)
+from gaitswarm.services.optimizer.jobs import listing
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import first_problems, unreadable
 from gaitswarm.services.optimizer.store.tables import recordings
@@ -36,7 +27,7 @@ if TYPE_CHECKING:
 class Recordings(Aggregate):
     """Recorded walks."""
 
-    def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
+    def add_recording(self, walk: RecordedWalk, *, actor: str = listing.LOCAL) -> str:
         """Store a recorded walk, once, and return its id, a digest of its content."""
         text = walk.model_dump_json()
         recording = hashlib.sha256(text.encode()).hexdigest()[:32]
@@ -58,7 +49,7 @@ class Recordings(Aggregate):
                         synthetic=walk.synthetic,
                     )
                 )
-                action = AuditAction.ADD_RECORDING
+                action = listing.AuditAction.ADD_RECORDING
                 note_change(connection, now, actor, action, recording=recording)
         return recording
 
@@ -69,22 +60,24 @@ class Recordings(Aggregate):
 
     def recording_list(
         self, *, search: str = "", after: str | None = None, limit: int = 50
-    ) -> Page[RecordingEntry]:
+    ) -> listing.Page[listing.RecordingEntry]:
         """Return a page of recorded walks, newest first. New walks do not shift later pages."""
-        limit = checked_limit(limit)
+        limit = listing.checked_limit(limit)
         table = recordings.c
-        columns = (table[name] for name in RecordingEntry._fields)
+        columns = (table[name] for name in listing.RecordingEntry._fields)
         query = select(*columns).order_by(table.created_at.desc(), table.id.desc())
         if after is not None:
-            place = from_cursor("recording", after, datetime)
+            place = listing.from_cursor("recording", after, datetime)
             query = query.where(tuple_(table.created_at, table.id) < place)
         if search:
             words = table.scenario + "\n" + table.controller + "\n" + table.id
-            query = query.where(func.lower(words).contains(folded(search), autoescape=True))
+            query = query.where(func.lower(words).contains(listing.folded(search), autoescape=True))
         with self._database.read("recording_list") as connection:
             rows = connection.execute(query.limit(limit + 1)).mappings().all()
-        entries = [RecordingEntry(**row) for row in rows]
-        return Page.of(entries, limit, lambda e: to_cursor("recording", e.created_at, e.id))
+        entries = [listing.RecordingEntry(**row) for row in rows]
+        return listing.Page.of(
+            entries, limit, lambda e: listing.to_cursor("recording", e.created_at, e.id)
+        )
 
 
 def load_recordings(connection: Connection, ids: Sequence[str]) -> Walks:

@@ -20,7 +20,6 @@ from gaitswarm.sim.firmware.folder import (
     check_table_bits,
     firmware_of,
 )
-from gaitswarm.sim.firmware.microcontroller import BUDGET
 from gaitswarm.sim.gait.setpoints import Setpoints, setpoints, trajectory_files
 from gaitswarm.sim.input import Line
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
@@ -134,8 +133,6 @@ class FirmwareView(View):
 def firmware_view(
     request: FirmwareRequest, firmware: Firmware, folder: str | None = None
 ) -> FirmwareView:
-    parts = {"direct": firmware.law.direct, "integrated": firmware.law.integrated}
-    memory = firmware.memory
     return FirmwareView(
         folder=folder,
         label=request.label,
@@ -144,8 +141,7 @@ def firmware_view(
         files={name: len(content) for name, content in firmware.files.items()},
         tables=[
             FirmwareTableView(name=name, shape=list(part.values.shape), bytes=part.values.nbytes)
-            for name, part in parts.items()
-            if part is not None
+            for name, part in firmware.law.tables.items()
         ],
         table_difference=firmware.table_difference,
         trajectories=[
@@ -169,18 +165,7 @@ def firmware_view(
             for log in firmware.logs
         ],
         samples=firmware.samples,
-        memory=FirmwareMemoryView(
-            processor=BUDGET.name,
-            flash=BUDGET.flash,
-            ram=BUDGET.ram,
-            cycles=BUDGET.cycles,
-            tables=memory.tables,
-            trajectories=memory.trajectories,
-            trajectories_of_a_leg=memory.trajectories_of_a_leg,
-            remembered=memory.ram,
-            fits=memory.fits,
-            remarks=list(memory.remarks()),
-        ),
+        memory=FirmwareMemoryView.model_validate(firmware.memory),
     )
 
 

@@ -22,7 +22,6 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.controllers.quantisation import Axis
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.firmware.microcontroller import (
-    BUDGET,
     LawIntegers,
     Memory,
     TrajectoryTable,
@@ -33,7 +32,6 @@ from gaitswarm.sim.firmware.microcontroller import (
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.kernel.emitted.source import control_tick
 from gaitswarm.sim.kernel.observation import encoder_angles, split_states
-from gaitswarm.sim.kernel.walk import Coding, WalkResult, WalkSetup
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
@@ -61,8 +59,8 @@ def law_header(law: LawIntegers) -> str:
         "PROPORTIONAL_GAIN": law.law.proportional_gain,
         "DERIVATIVE_GAIN": law.law.derivative_gain,
         "INTEGRAL_GAIN": law.law.integral_gain,
-        **_table_numbers("DIRECT", law.direct),
-        **_table_numbers("INTEGRATED", law.integrated),
+        **_table_numbers("DIRECT", law.tables.get("direct")),
+        **_table_numbers("INTEGRATED", law.tables.get("integrated")),
     }
     return filled(
         "law.h",
@@ -118,7 +116,7 @@ def controller_header(robot: Robot, controller: str, label: str) -> str:
 def tables_source(law: LawIntegers) -> str:
     """`tables.c`: the fuzzy tables."""
     lines = ['#include "tables.h"', ""]
-    for name, table in _tables(law).items():
+    for name, table in law.tables.items():
         head = f"const int8_t {name}_table[{name.upper()}_CELLS] = {{"
         lines += [head, *_rows(table.values), "};", ""]
     return "\n".join(lines)
@@ -150,14 +148,14 @@ def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
 
 def expected_header(law: LawIntegers, walks: int, legs: int) -> str:
     """`test/expected.h`: numbers of compared walks and tables."""
-    return filled("test/expected.h", legs=legs, walks=walks, tables=len(_tables(law)))
+    return filled("test/expected.h", legs=legs, walks=walks, tables=len(law.tables))
 
 
 def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
     """`test/expected.c`: files of walks, and hashes of tables."""
     tables = [
         f'    {{"{name} table", {name}_table, {table.values.size}u, {fnv(table.values)}u}},'
-        for name, table in _tables(law).items()
+        for name, table in law.tables.items()
     ]
     return "\n".join(
         [
@@ -184,11 +182,6 @@ def fnv(values: NDArray[np.int8]) -> int:
     for byte in values.tobytes():
         hashed = (hashed ^ byte) * 16777619 & 0xFFFFFFFF
     return hashed
-
-
-def _tables(law: LawIntegers) -> dict[str, LookupTable]:
-    parts = {"direct": law.direct, "integrated": law.integrated}
-    return {name: table for name, table in parts.items() if table is not None}
 
 
 def _rows(values: NDArray[np.integer]) -> Iterable[str]:
@@ -224,12 +217,12 @@ def readme(
         controller=controller,
         period=f"{CONTROL_PERIOD * 1000:g}",
         rate=f"{1.0 / CONTROL_PERIOD:g}",
-        processor=BUDGET.name,
-        flash=BUDGET.flash,
-        ram=BUDGET.ram,
+        processor=memory.processor,
+        flash=memory.flash,
+        ram=memory.ram,
         tables=memory.tables,
-        remembered=memory.ram,
-        remarks="\n".join(f"\n**It does not fit:** {remark}." for remark in memory.remarks()),
+        remembered=memory.remembered,
+        remarks="\n".join(f"\n**It does not fit:** {remark}." for remark in memory.remarks),
         trajectories="\n".join(rows),
         validate="\n".join(
             f"gaitswarm validate measured.csv --design firmware.json --controller {controller}"
@@ -270,42 +263,32 @@ def control_logs(
     for scenario in walked:
         require_reachable(robot, scenario)
         plan = plan_walk(robot, scenario, timestep)
-        if plan is None:
-            raise AssertionError("a reachable gait has a plan")
+        assert plan is not None  # noqa: S101 - the gait is reachable
         setups.append(plan(law))
-    results = kernel.walk(setups, coding, log=True)
-    return tuple(
-        _control_log(robot, scenario, coding, timestep, setup, result)
-        for scenario, setup, result in zip(walked, setups, results, strict=True)
-    )
-
-
-def _control_log(
-    robot: Robot,
-    scenario: Scenario,
-    coding: Coding,
-    timestep: float,
-    setup: WalkSetup,
-    result: WalkResult,
-) -> ControlLog:
-    if result.states is None:
-        raise AssertionError("a walk with a log has states")
-    walked = int(np.isfinite(result.states).all(axis=1).sum())
-    states = split_states(robot, result.states[:walked])
-    desired = setup.desired[:walked].astype(np.int64)
-    angle = coding.angle_codes(encoder_angles(robot, states))
-    current = coding.current_codes(states.sensed_current)
-    joints = robot.joint_names
-    status, objectives = judge(setup, result, coding.substeps, timestep)
-    return ControlLog(
-        scenario=scenario,
-        status=status,
-        desired=in_16_bits(desired, np.int16, f"{scenario.name}: the desired angle", joints),
-        angle=in_16_bits(angle, np.int16, f"{scenario.name}: the angle", joints),
-        current=in_16_bits(current, np.uint16, f"{scenario.name}: the current", joints),
-        pwm=coding.pwm_codes(states.duty).astype(np.int16),
-        objectives=objectives,
-    )
+    logs = []
+    for scenario, setup, result in zip(
+        walked, setups, kernel.walk(setups, coding, log=True), strict=True
+    ):
+        assert result.states is not None  # noqa: S101
+        ticks = int(np.isfinite(result.states).all(axis=1).sum())
+        states = split_states(robot, result.states[:ticks])
+        name, joints = scenario.name, robot.joint_names
+        desired = setup.desired[:ticks].astype(np.int64)
+        angle = coding.angle_codes(encoder_angles(robot, states))
+        current = coding.current_codes(states.sensed_current)
+        status, objectives = judge(setup, result, coding.substeps, timestep)
+        logs.append(
+            ControlLog(
+                scenario=scenario,
+                status=status,
+                desired=in_16_bits(desired, np.int16, f"{name}: the desired angle", joints),
+                angle=in_16_bits(angle, np.int16, f"{name}: the angle", joints),
+                current=in_16_bits(current, np.uint16, f"{name}: the current", joints),
+                pwm=coding.pwm_codes(states.duty).astype(np.int16),
+                objectives=objectives,
+            )
+        )
+    return tuple(logs)
 
 
 MANIFEST: Final = "firmware.json"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import ClassVar, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.controllers.base import ControlLaw, LookupTable, Response
+from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD, FRACTION_BITS, INTEGRAL_BITS
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
@@ -41,48 +41,43 @@ class LawIntegers:
     """A control law in the integers of a microcontroller."""
 
     law: ControlLaw
-    full_scale: int  # of the PWM [counts]
-    pwm_step: int  # resolution of the PWM [counts]
+    tables: Mapping[str, LookupTable]  # of the parts `direct` and `integrated`
     # width of numbers with 16 fraction bits, 32 or 64: the smaller one that suffices
     fine_bits: int
     ranges: tuple[Range, ...]
-
-    @property
-    def direct(self) -> LookupTable | None:
-        return as_table(self.law.direct)
-
-    @property
-    def integrated(self) -> LookupTable | None:
-        return as_table(self.law.integrated)
 
 
 def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
     """Bound every number of the control tick for any readings."""
     check_gains(law, torque=False)
-    direct, integrated = as_table(law.direct), as_table(law.integrated)
+    tables: dict[str, LookupTable] = {}
+    for part, response in (("direct", law.direct), ("integrated", law.integrated)):
+        if isinstance(response, LookupTable):
+            tables[part] = response
+        elif response is not None:
+            raise SimulationInputError("firmware requires a table instead of an inference")
     half = 1 << (FRACTION_BITS - 1)
     change = 2 * CODE_LIMIT
-    products = max((_largest_product(t) for t in (direct, integrated) if t), default=0) + half
+    products = max(map(_largest_product, tables.values()), default=0) + half
     now = (
         CODE_LIMIT * abs(law.proportional_gain)
         + change * abs(law.derivative_gain)
-        + _largest_output(direct)
+        + _largest_output(tables.get("direct"))
         + half
     )
     grown = (
         (coding.pwm_counts << INTEGRAL_BITS)
         + CODE_LIMIT * abs(law.integral_gain)
-        + _largest_output(integrated)
+        + _largest_output(tables.get("integrated"))
         + (1 << (INTEGRAL_BITS - 1))
     )
     # The middle of an axis is added to its index; tables have fewer than 2^16 rows.
     fine = _NARROW if max(products, now) <= _INT32 - (1 << 16) else _WIDE
     return LawIntegers(
-        law=law,
-        full_scale=coding.pwm_counts,
-        pwm_step=coding.pwm_step,
-        fine_bits=fine,
-        ranges=(
+        law,
+        tables,
+        fine,
+        (
             Range("error", "angle error [counts]", CODE_LIMIT, _NARROW),
             Range("change", "of the error over a tick [counts]", change, _NARROW),
             Range("current", "absolute current [counts]", CODE_LIMIT, _NARROW),
@@ -92,12 +87,6 @@ def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
             Range("pwm", "output [PWM counts]", coding.pwm_counts, 16),
         ),
     )
-
-
-def as_table(response: Response | None) -> LookupTable | None:
-    if response is None or isinstance(response, LookupTable):
-        return response
-    raise SimulationInputError("firmware requires a table instead of an inference")
 
 
 def in_16_bits(
@@ -197,19 +186,6 @@ def _table(name: str, codes: NDArray[np.int16], repeats_from: int) -> Trajectory
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Budget:
-    """A microcontroller."""
-
-    name: str
-    flash: int  # [B]
-    ram: int  # [B]
-    cycles: int  # per control tick
-
-
-BUDGET: Final = Budget("MSP430F2618", flash=116 << 10, ram=8 << 10, cycles=32_000)
-"""One per leg: 16 MHz at 500 Hz."""
-
 CODE_BYTES: Final = 2048
 """Estimate for the control tick without tables, with a margin: a Cortex-M0's is half as long."""
 
@@ -218,51 +194,51 @@ CODE_BYTES: Final = 2048
 class Memory:
     """Memory of firmware; trajectories are on the robot's central ARM, or on the legs."""
 
-    tables: int  # of the fuzzy tables, eq. 5.1 [B].
+    # One microcontroller per leg: its flash [B], RAM [B], and cycles per tick at 16 MHz and 500 Hz.
+    processor: ClassVar = "MSP430F2618"
+    flash: ClassVar = 116 << 10
+    ram: ClassVar = 8 << 10
+    cycles: ClassVar = 32_000
+
+    # State between ticks [B]: a 64-bit integral and a 32-bit error per joint, and a flag.
+    remembered: ClassVar = JOINTS_PER_LEG * (8 + 4) + 4
+
+    tables: int  # of the fuzzy tables, eq. 5.1 [B]
     trajectories: int  # of all joints of all scenarios [B]
     trajectories_of_a_leg: int  # of one leg's joints [B]
-    ram: int  # state of the controller between ticks [B]
 
     @classmethod
     def of(cls, law: LawIntegers, trajectories: Sequence[TrajectoryTable]) -> Memory:
-        tables = (table for table in (law.direct, law.integrated) if table is not None)
-        # A 64-bit integral and a 32-bit error per joint, and a flag.
         return cls(
-            tables=sum(table.values.nbytes for table in tables),
-            trajectories=sum(table.bytes for table in trajectories),
-            trajectories_of_a_leg=sum(table.bytes_of_a_leg for table in trajectories),
-            ram=JOINTS_PER_LEG * (8 + 4) + 4,
+            sum(table.values.nbytes for table in law.tables.values()),
+            sum(table.bytes for table in trajectories),
+            sum(table.bytes_of_a_leg for table in trajectories),
         )
 
     @property
-    def flash(self) -> int:
-        """Of the controller, its code counted as `CODE_BYTES` [B]."""
-        return self.tables + CODE_BYTES
+    def _left(self) -> int:
+        """Flash that the controller leaves [B]."""
+        return self.flash - self.tables - CODE_BYTES
 
     @property
     def fits(self) -> bool:
         """Whether the controller fits the microcontroller, without trajectories."""
-        return self.flash <= BUDGET.flash
+        return self._left >= 0
 
     @property
-    def trajectories_fit(self) -> bool:
-        """Whether a leg's trajectories fit in addition to its controller."""
-        return self.flash + self.trajectories_of_a_leg <= BUDGET.flash
-
-    def remarks(self) -> tuple[str, ...]:
-        """Describe what does not fit, with the remedy."""
+    def remarks(self) -> list[str]:
+        """What does not fit, with the remedy."""
         remarks = []
         if not self.fits:
             remarks.append(
                 f"tables of {self.tables} B and about {CODE_BYTES} B of code exceed the flash of an"
-                f" {BUDGET.name} ({BUDGET.flash} B) by {self.flash - BUDGET.flash} B; use a table"
-                " of fewer bits (8x6: 16384 B instead of 65536 B) or a microcontroller with more"
+                f" {self.processor} ({self.flash} B) by {-self._left} B; use a table of fewer bits"
+                " (8x6: 16384 B instead of 65536 B) or a microcontroller with more"
             )
-        if not self.trajectories_fit:
-            rest = max(0, BUDGET.flash - self.flash)
+        if self.trajectories_of_a_leg > self._left:
             remarks.append(
-                f"a leg's trajectories take {self.trajectories_of_a_leg} B, but its {BUDGET.name}"
-                f" has {rest} B left; let the robot's central processor play them, as in the"
-                " thesis, or write fewer scenarios"
+                f"a leg's trajectories take {self.trajectories_of_a_leg} B, but its"
+                f" {self.processor} has {max(0, self._left)} B left; let the robot's central"
+                " processor play them, as in the thesis, or write fewer scenarios"
             )
-        return tuple(remarks)
+        return remarks

@@ -45,16 +45,15 @@ def test_extreme_readings_stay_within_the_ranges(
     error = np.array([-LARGEST, -1, 0, 1, LARGEST], dtype=np.int64)
     change, current = 2 * error, np.abs(error)
     direct = error * law.law.proportional_gain + change * law.law.derivative_gain
-    for table in (law.direct, law.integrated):
-        if table is not None:
-            for reading, gain in (
-                (error, table.error_gain),
-                (current, table.current_gain),
-                (change, table.velocity_gain),
-            ):
-                assert np.abs(reading * gain).max() + (1 << 15) <= within["index"]
-    if law.direct is not None:
-        direct = direct + law.direct.respond(error, current, change)
+    for table in law.tables.values():
+        for reading, gain in (
+            (error, table.error_gain),
+            (current, table.current_gain),
+            (change, table.velocity_gain),
+        ):
+            assert np.abs(reading * gain).max() + (1 << 15) <= within["index"]
+    if "direct" in law.tables:
+        direct = direct + law.tables["direct"].respond(error, current, change)
     assert np.abs(direct).max() + (1 << 15) <= within["now"]
     assert all(own.largest < 1 << (own.bits - 1) for own in law.ranges)
 

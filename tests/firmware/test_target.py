@@ -13,7 +13,7 @@ import pytest
 from gaitswarm.firmware import write_firmware
 from gaitswarm.sim.catalogue import GAIT_CATALOGUE
 from gaitswarm.sim.controllers import ControllerName
-from gaitswarm.sim.firmware.microcontroller import BUDGET, CODE_BYTES
+from gaitswarm.sim.firmware.microcontroller import CODE_BYTES, Memory
 from tests.examples.walks import short_walk
 from tests.firmware.conftest import TOOLS, make, published, with_changed_cell
 
@@ -40,7 +40,7 @@ def test_both_processors_reproduce_the_simulator_in_time(copy_of_a: Path) -> Non
     counts = [tuple(map(int, found)) for found in COUNTED.findall(ran.out)]
     assert len(counts) == 2
     # Half the budget remains for converters, buses and interrupts.
-    assert all(0 < mean <= most < BUDGET.cycles / 2 for mean, most in counts)
+    assert all(0 < mean <= most < Memory.cycles / 2 for mean, most in counts)
     sizes = {name: tuple(map(int, s)) for *s, name in SIZES.findall(ran.out)}
     text, data, bss = sizes["controller"]
     assert text <= CODE_BYTES and (data, bss) == (0, 40)
@@ -103,7 +103,7 @@ def test_cycles_are_those_of_the_counted_instructions(brief_a: Path) -> None:
     assert abs(instructions - int(counted[1])) <= 3
     # An instruction takes one to four cycles, and none is shorter on 16 bits.
     assert instructions < cortex < 4 * instructions
-    assert cortex < estimated < BUDGET.cycles
+    assert cortex < estimated < Memory.cycles
 
 
 def test_missing_tools_are_named(brief_a: Path, tmp_path: Path) -> None:

@@ -36,9 +36,12 @@ class Gait:
     legs: tuple[int, ...]
     # from the legs' rows to the lag of each leg, by its index
     lags: Callable[[Rows], Mapping[int, float]]
-    # from the number of legs to the share of support at which a foot lifts off when another one has
-    # touched down [1]
-    duty_factor: Callable[[int], float]
+    # feet in the air at a time; None for half of them
+    swinging: int | None = None
+
+    def duty_factor(self, legs: int) -> float:
+        """Share of support at which a foot lifts off when another one has touched down [1]."""
+        return 0.5 if self.swinging is None else 1.0 - self.swinging / legs
 
     @property
     def legs_in_words(self) -> str:
@@ -76,18 +79,6 @@ def _bound(rows: Rows) -> dict[int, float]:
     return {leg: 0.5 * (row - 1 - place) for leg, _, place, row in _places(rows)}
 
 
-def _half(legs: int) -> float:  # noqa: ARG001 - of any number of legs
-    return 0.5
-
-
-def _one_in_the_air(legs: int) -> float:
-    return 1.0 - 1.0 / legs
-
-
-def _two_in_the_air(legs: int) -> float:
-    return 1.0 - 2.0 / legs
-
-
 _GAITS: Final = (
     Gait(
         "alternating",
@@ -95,7 +86,6 @@ _GAITS: Final = (
         " four legs, the tripod of six",
         (),
         _alternating,
-        _half,
     ),
     Gait(
         "tripod",
@@ -103,7 +93,6 @@ _GAITS: Final = (
         " (Wilson 1966)",
         (6,),
         _alternating,
-        _half,
     ),
     Gait(
         "wave",
@@ -111,7 +100,7 @@ _GAITS: Final = (
         " Song and Waldron 1987)",
         (),
         _wave,
-        _one_in_the_air,
+        1,
     ),
     Gait(
         "ripple",
@@ -119,22 +108,20 @@ _GAITS: Final = (
         " gait (Wilson 1966)",
         (6, 8, 10, 12),
         _ripple,
-        _two_in_the_air,
+        2,
     ),
-    Gait("trot", "diagonal pairs half a cycle apart (Hildebrand 1965)", (4,), _alternating, _half),
+    Gait("trot", "diagonal pairs half a cycle apart (Hildebrand 1965)", (4,), _alternating),
     Gait(
         "pace",
         "the legs of a side together, the sides half a cycle apart (Hildebrand 1965)",
         (4,),
         _pace,
-        _half,
     ),
     Gait(
         "bound",
         "the hind legs together, the front legs half a cycle later (Hildebrand 1989)",
         (4,),
         _bound,
-        _half,
     ),
     Gait(
         "crawl",
@@ -142,7 +129,7 @@ _GAITS: Final = (
         " sequence, of all orders the most stable (McGhee and Frank 1968)",
         (4,),
         _wave,
-        _one_in_the_air,
+        1,
     ),
 )
 

@@ -345,7 +345,7 @@ def native_kernel(
         loading = _loading.setdefault(identity, threading.Lock())
     with loading:
         if identity not in _libraries:
-            _libraries[identity] = _load(robot, precision, None, (), uneven=uneven)
+            _libraries[identity] = _load(robot, precision, uneven=uneven)
         library = _libraries[identity]
     if library is None:
         return None
@@ -360,25 +360,20 @@ def native_kernel(
 
 
 def load_kernel(
-    robot: Robot,
-    precision: Precision = "double",
-    *,
-    compile_for: Target | None = None,
-    extra_flags: Sequence[str] = (),
-    uneven: bool = False,
+    robot: Robot, precision: Precision = "double", **options: Any
 ) -> NativeKernel | None:
     """Load a kernel without caching it in this process, to compare ways of compiling."""
-    library = _load(robot, precision, compile_for, extra_flags, uneven=uneven)
+    library = _load(robot, precision, **options)
     return None if library is None else NativeKernel(robot, library)
 
 
 def _load(
     robot: Robot,
     precision: Precision,
-    compile_for: Target | None,
-    extra_flags: Sequence[str],
     *,
-    uneven: bool,
+    uneven: bool = False,
+    compile_for: Target | None = None,
+    extra_flags: Sequence[str] = (),
 ) -> ctypes.CDLL | None:
     return load_library(
         "kernel" if precision == "double" else "kernel-single",

@@ -121,11 +121,11 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         parameters[:begin, pushes] = parameters[end:, pushes] = 0.0
         arguments = [part[:walked].T for part in (*inputs, parameters)]
         if setup.terrain is not None:
-            places = np.array(_placing(robot, walked)(arguments[0])).T
+            places = np.array(_mapped(robot, "places", walked, uneven=True)(arguments[0])).T
             x, y, *_ = places.reshape(-1, 6).T
             arguments.append(np.stack(setup.terrain.under(x, y), axis=1).reshape(walked, -1).T)
-        observed = _observing(robot, walked, uneven=setup.terrain is not None)(*arguments)
-        for target, part in zip(seen, observed, strict=False):
+        observe = _mapped(robot, "observe", walked, uneven=setup.terrain is not None)
+        for target, part in zip(seen, observe(*arguments), strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen
     return WalkLog(
@@ -145,19 +145,12 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
     )
 
 
-@lru_cache(maxsize=16)
-def _observing(robot: Robot, instants: int, *, uneven: bool) -> Any:
+@lru_cache(maxsize=32)
+def _mapped(robot: Robot, function: str, instants: int, *, uneven: bool) -> Any:
     # Imported here: with a compiled kernel, only logs need CasADi.
     from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
 
-    return physics_model(robot, uneven=uneven).observe.map(instants)
-
-
-@lru_cache(maxsize=16)
-def _placing(robot: Robot, instants: int) -> Any:
-    from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
-
-    return physics_model(robot, uneven=True).places.map(instants)
+    return getattr(physics_model(robot, uneven=uneven), function).map(instants)
 
 
 def sensed_currents(

@@ -30,9 +30,6 @@ Soles = Literal["none", "spheres", "points"]
 """Contact with the ground: none, with external forces on the feet; spheres of the sole's length
 about the tibias' ends; or, with the ground raised by that length, these ends as points."""
 
-TIMESTEP: Final = 2e-4
-"""Default [s]."""
-
 _FULL: Final = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 """MJCF's order of an inertia's elements: xx, yy, zz, xy, xz, yz."""
 
@@ -111,7 +108,7 @@ def height_field(surroundings: Surroundings, soles: Soles) -> HeightField:
 class Rig:
     """Optional parts of a model besides its rigid bodies."""
 
-    timestep: float = TIMESTEP  # of MuJoCo's steps [s]
+    timestep: float = 2e-4  # of MuJoCo's steps [s]
     soles: Soles = "none"
     # attributes of each foot's contact pair, in the order of the legs; empty for MuJoCo's defaults
     contacts: Sequence[Mapping[str, str]] = ()
@@ -333,35 +330,23 @@ def _add_sensors(root: ET.Element, sites: Sequence[str]) -> None:
 
 
 def _add_motors(root: ET.Element, robot: Robot) -> None:
-    actuator = ET.SubElement(root, "actuator")
-    actuators = robot.actuators()
-    if robot.is_torque_controlled:
-        for name, limit, friction in zip(
-            robot.joint_names, actuators.torque_limit, actuators.viscous, strict=True
-        ):
-            ET.SubElement(
-                actuator,
-                "general",
-                name=f"{name}_torque",
-                joint=name,
-                ctrllimited="true",
-                ctrlrange=_numbers([-limit, limit]),
-                gainprm="1",
-                biastype="affine",
-                biasprm=_numbers([0.0, 0.0, -friction]),
-            )
-        return
-    for name, k, r, b in zip(
-        robot.joint_names, actuators.torque, actuators.resistance, actuators.viscous, strict=True
-    ):
+    actuator, a = ET.SubElement(root, "actuator"), robot.actuators()
+    for k, name in enumerate(robot.joint_names):
+        if robot.is_torque_controlled:
+            limit, gain, damping = float(a.torque_limit[k]), "1", a.viscous[k]
+            limits = {"ctrllimited": "true", "ctrlrange": _numbers([-limit, limit])}
+        else:
+            per_volt = a.torque[k] / a.resistance[k]
+            gain, limits = repr(float(per_volt)), {}
+            damping = a.torque[k] * a.torque[k] / a.resistance[k] + a.viscous[k]
+        unit = "torque" if robot.is_torque_controlled else "voltage"
         ET.SubElement(
             actuator,
             "general",
-            name=f"{name}_voltage",
-            joint=name,
-            gainprm=repr(float(k / r)),
+            {"name": f"{name}_{unit}", "joint": name} | limits,
+            gainprm=gain,
             biastype="affine",
-            biasprm=_numbers([0.0, 0.0, -(k * k / r + b)]),
+            biasprm=_numbers([0.0, 0.0, -damping]),
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from gaitswarm.sim.gait.gaits import leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
-from gaitswarm.sim.mujoco.mjcf import TIMESTEP, Rig, Surroundings, mjcf
+from gaitswarm.sim.mujoco.mjcf import Rig, Surroundings, mjcf
 from gaitswarm.sim.robot.description import Contact
 from gaitswarm.sim.robot.limbs import resting_height
 from gaitswarm.sim.robot.robot import Robot
@@ -38,22 +38,6 @@ class Feet:
     # impratio, stiffness of the tangential constraint relative to the normal one. At 1 a sliding
     # foot would also be lifted; the tangential impedance is this times `impedance`.
     friction_impedance: float = 100.0
-
-
-def model(
-    robot: Robot,
-    *,
-    scenario: Scenario | None = None,
-    timestep: float = TIMESTEP,
-    feet: Feet | None = None,
-    voltage_motors: bool = False,
-) -> mujoco.MjModel:
-    """Return the compiled model of a robot in a scenario."""
-    rig = Rig(timestep, voltage_motors=voltage_motors)
-    surroundings = Surroundings.of(robot, scenario)
-    if feet is not None:
-        rig = with_contacts(robot, surroundings, rig, feet)
-    return mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
 
 
 def with_contacts(robot: Robot, surroundings: Surroundings, rig: Rig, feet: Feet) -> Rig:

@@ -1,21 +1,32 @@
-"""A robot's numbers for the forces in MuJoCo, directly from its description."""
+"""A robot's model and its numbers for the forces in MuJoCo, directly from its description."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.kernel.parameters import DRY_FRICTION
 from gaitswarm.sim.mujoco.forces import Gears, Ground
-from gaitswarm.sim.mujoco.mjcf import Surroundings
-from gaitswarm.sim.mujoco.model import Feet, even_drags
+from gaitswarm.sim.mujoco.mjcf import Rig, Surroundings, mjcf
+from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
 from gaitswarm.sim.robot.description import DIRECTIONAL_FRICTION, Contact
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
+
+
+def model(
+    robot: Robot, *, scenario: Scenario | None = None, feet: Feet | None = None
+) -> mujoco.MjModel:
+    """A robot in a scenario, compiled by MuJoCo."""
+    rig, surroundings = Rig(), Surroundings.of(robot, scenario)
+    if feet is not None:
+        rig = with_contacts(robot, surroundings, rig, feet)
+    return mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
 
 
 def own_gears(robot: Robot, angles: Floats) -> Gears:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.mujoco.forces import Ground
-from gaitswarm.sim.mujoco.model import model
 from gaitswarm.sim.robot.bounds import ContactLaw
 from gaitswarm.sim.robot.robot import Robot
+from tests.mujoco.numbers import model
 
 Floats = NDArray[np.float64]
 Drag = tuple[Floats, Floats]

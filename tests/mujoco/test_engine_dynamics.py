@@ -10,13 +10,12 @@ import pytest
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.parameters import pack_parameters
 from gaitswarm.sim.mujoco.forces import Gears, Ground
-from gaitswarm.sim.mujoco.model import model
 from gaitswarm.sim.robot import RobotChoice, RobotFiles, RobotVariant, load_robot
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import STEEP, random_state, torque_quadruped_files
 from tests.mujoco.leapfrog import Leapfrog
-from tests.mujoco.numbers import even_feet, own_gears, own_ground
+from tests.mujoco.numbers import even_feet, model, own_gears, own_ground
 from tests.mujoco.resistance import Floats, apply_forces, feet_of
 from tests.mujoco.walker import LANDING_HORIZON
 

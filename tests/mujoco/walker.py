@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.mujoco.forces import Gears
-from gaitswarm.sim.mujoco.model import model
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
 from tests.mujoco.leapfrog import Leapfrog, Middle
-from tests.mujoco.numbers import own_gears, own_ground
+from tests.mujoco.numbers import model, own_gears, own_ground
 
 Floats = NDArray[np.float64]
 

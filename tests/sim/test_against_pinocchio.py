@@ -11,7 +11,7 @@ import pytest
 
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState, body_of, body_state
-from gaitswarm.sim.kernel.dynamics.limb import links_at
+from gaitswarm.sim.kernel.dynamics.limb import links_of, turns
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
 from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
@@ -71,7 +71,7 @@ def _symbolic_tree(robot: Robot) -> Any:
     for n, limb in enumerate(limbs_of(robot)):
         angles, rates = q[7 + 3 * n : 10 + 3 * n], v[6 + 3 * n : 9 + 3 * n]
         at, state = positions[0], states[0]
-        for link in links_at(limb, angles, rates):
+        for link in links_of(limb, *turns(limb, angles), rates):
             at, state = add(at, apply(_to_world(state), link.offset)), state.carries(link)
             states.append(state)
             positions.append(at)

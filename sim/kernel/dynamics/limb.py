@@ -134,8 +134,8 @@ def before(
 ) -> Before:
     """Compute the inertia and force that the limb passes to the body, from the body's state."""
     half = 0.5 * environment.timestep
-    sines, cosines = _turns(limb, state.angles)
-    links = _links(limb, sines, cosines, state.rates)
+    sines, cosines = turns(limb, state.angles)
+    links = links_of(limb, sines, cosines, state.rates)
     states = []
     for link in links:
         base = base.carries(link)
@@ -201,7 +201,7 @@ def before(
 def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Scalar) -> After:
     """Compute the limb's accelerations from the body's; rates are those before the step."""
     half = 0.5 * timestep
-    links = _links(limb, held.sines, held.cosines, rates)
+    links = links_of(limb, held.sines, held.cosines, rates)
     turned = outward(links, held.passed, carrier)
     accelerations = tuple(j.sign * a for j, a in zip(limb.joints, turned, strict=True))
     voltages, currents, loads = [], [], []
@@ -242,7 +242,7 @@ def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Sca
 def place(limb: Limb, q: Sequence[Scalar], angles: Sequence[Scalar]) -> Scalars:
     """Foot, then knee (the tibia's joint) in the world, x, y, z each [m], for a body at q (7)."""
     foot, knee = limb.foot, (0.0, 0.0, 0.0)
-    links = _links(limb, *_turns(limb, angles), [0.0] * len(limb.joints))
+    links = links_of(limb, *turns(limb, angles), [0.0] * len(limb.joints))
     for link in reversed(links):
         foot = add(link.offset, link.rotation.inwards(foot))
         knee = link.offset if link is links[-1] else add(link.offset, link.rotation.inwards(knee))
@@ -250,18 +250,13 @@ def place(limb: Limb, q: Sequence[Scalar], angles: Sequence[Scalar]) -> Scalars:
     return (*add(at, apply(attitude, foot)), *add(at, apply(attitude, knee)))
 
 
-def links_at(limb: Limb, angles: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Link]:
-    """The links of a limb at joint angles [rad] and rates [rad/s]."""
-    return _links(limb, *_turns(limb, angles), rates)
-
-
-def _turns(limb: Limb, angles: Sequence[Scalar]) -> tuple[Scalars, Scalars]:
+def turns(limb: Limb, angles: Sequence[Scalar]) -> tuple[Scalars, Scalars]:
     """Sines and cosines of the rotations about the joints' axes."""
     sines = tuple(j.sign * ca.sin(angle) for j, angle in zip(limb.joints, angles, strict=True))
     return sines, tuple(ca.cos(angle) for angle in angles)
 
 
-def _links(limb: Limb, sines: Scalars, cosines: Scalars, rates: Sequence[Scalar]) -> list[Link]:
+def links_of(limb: Limb, sines: Scalars, cosines: Scalars, rates: Sequence[Scalar]) -> list[Link]:
     return [
         Link(
             axis=joint.axis,

@@ -165,7 +165,74 @@ class PhysicsModel:
         )
 
     def _step(self, timestep: Scalar) -> _Step:
-        return _step(self._robot, self._limbs, self.layout, self._symbols, timestep)
+        robot, limbs, layout, s = self._robot, self._limbs, self.layout, self._symbols
+        n, law = robot.n_joints, robot.description.contact_law
+        motors = s.internal_state[: 2 * n] if robot.has_backlash else []
+        rest = s.internal_state[len(motors) :]
+        springs, loads = (rest[:n], rest[n : 2 * n]) if robot.has_dry_friction else ([], [])
+        carried = rest[len(springs) + len(loads) :]
+        joints = [joint for limb in limbs for joint in limb.joints]
+        supply = battery_voltage(
+            electrical_constants(joints),
+            s.duty,
+            motors[n:] or s.v[6:],
+            s.p["supply_voltage"][0],
+            s.p["supply_resistance"][0],
+            torque=robot.is_torque_controlled,
+        )
+        environment = Environment(timestep, supply, *s.p["displaced"])
+        state, body = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
+
+        def limb_before(
+            limb: Limb,
+            base: LinkState,
+            state: LimbState,
+            around: Environment,
+            p: tuple[Scalars, ...],
+        ) -> Before:
+            return before(limb, law, base, state, around, dict(zip(layout.by_limb, p, strict=True)))
+
+        before_of = _ByKind(limbs, limb_before, law, *layout.by_limb)
+        after_of = _ByKind(limbs, after)
+        gears = motors[:n], motors[n:], springs, loads
+        parts = s.q[7:], s.v[6:], s.duty, s.disturbance, *gears, carried, s.patches
+        befores = [
+            before_of(
+                k,
+                state,
+                LimbState(*(_of_limb(values, k, len(limbs)) for values in parts)),
+                environment,
+                tuple(_of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb),
+            )
+            for k in range(len(limbs))
+        ]
+        inertia, force = body.inertia(), state.force(body)
+        force = Force(add(force.linear, pushed(state, s.p["push"])), force.angular)
+        for limb in befores:
+            inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
+        falling, true = solved(state, inertia, force)
+        afters = [
+            after_of(k, limb.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
+            for k, limb in enumerate(befores)
+        ]
+        twist = [*true.linear, *true.angular]
+        faster = [old + timestep * rate for old, rate in zip(s.v[:6], twist, strict=True)]
+        return _Step(
+            supply=supply,
+            before=befores,
+            after=afters,
+            acceleration=twist,
+            velocity=[*faster, *(rate for limb in afters for rate in limb.rates)],
+            internal_state=[
+                *motors[:n],
+                *(rate for limb in befores for rate in limb.motor_rates),
+                *(spring for limb in befores for spring in limb.springs),
+                *(load for limb in afters for load in limb.loads if springs),
+                *(value for limb in befores for value in limb.carried),
+            ],
+            of_body=body_integrands(state, true, timestep),
+            lean=body_lean(state),
+        )
 
 
 @lru_cache(maxsize=16)
@@ -207,74 +274,6 @@ class _Step:
         load, power, *others = (sum(self.tally(k)) for k in range(6))
         acceleration, angular, forward = self.of_body
         return [load * load, acceleration, angular, power, forward, *others]
-
-
-def _step(
-    robot: Robot, limbs: Sequence[Limb], layout: Layout, s: _Symbols, timestep: Scalar
-) -> _Step:
-    n, law = robot.n_joints, robot.description.contact_law
-    motors = s.internal_state[: 2 * n] if robot.has_backlash else []
-    rest = s.internal_state[len(motors) :]
-    springs, loads = (rest[:n], rest[n : 2 * n]) if robot.has_dry_friction else ([], [])
-    carried = rest[len(springs) + len(loads) :]
-    joints = [joint for limb in limbs for joint in limb.joints]
-    supply = battery_voltage(
-        electrical_constants(joints),
-        s.duty,
-        motors[n:] or s.v[6:],
-        s.p["supply_voltage"][0],
-        s.p["supply_resistance"][0],
-        torque=robot.is_torque_controlled,
-    )
-    environment = Environment(timestep, supply, *s.p["displaced"])
-    state, body = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
-
-    def limb_before(
-        limb: Limb, base: LinkState, state: LimbState, around: Environment, p: tuple[Scalars, ...]
-    ) -> Before:
-        return before(limb, law, base, state, around, dict(zip(layout.by_limb, p, strict=True)))
-
-    before_of = _ByKind(limbs, limb_before, law, *layout.by_limb)
-    after_of = _ByKind(limbs, after)
-    gears = motors[:n], motors[n:], springs, loads
-    parts = s.q[7:], s.v[6:], s.duty, s.disturbance, *gears, carried, s.patches
-    befores = [
-        before_of(
-            k,
-            state,
-            LimbState(*(_of_limb(values, k, len(limbs)) for values in parts)),
-            environment,
-            tuple(_of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb),
-        )
-        for k in range(len(limbs))
-    ]
-    inertia, force = body.inertia(), state.force(body)
-    force = Force(add(force.linear, pushed(state, s.p["push"])), force.angular)
-    for limb in befores:
-        inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
-    falling, true = solved(state, inertia, force)
-    afters = [
-        after_of(k, limb.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
-        for k, limb in enumerate(befores)
-    ]
-    twist = [*true.linear, *true.angular]
-    faster = [old + timestep * rate for old, rate in zip(s.v[:6], twist, strict=True)]
-    return _Step(
-        supply=supply,
-        before=befores,
-        after=afters,
-        acceleration=twist,
-        velocity=[*faster, *(rate for limb in afters for rate in limb.rates)],
-        internal_state=[
-            *motors[:n],
-            *(rate for limb in befores for rate in limb.motor_rates),
-            *(spring for limb in befores for spring in limb.springs),
-            *(load for limb in afters for load in limb.loads if springs),
-            *(value for limb in befores for value in limb.carried),
-        ],
-        of_body=body_integrands(state, true, timestep),
-        lean=body_lean(state),
-    )
 
 
 _traces: Final[dict[Hashable, Any]] = {}

@@ -28,8 +28,6 @@ ones are removed when another one is built."""
 
 DEFAULT_SIZE: Final = 1 << 30
 
-_DAY: Final = 86400.0
-
 _USE_RESOLUTION: Final = 60.0
 """Resolution of the recorded time of use [s]."""
 
@@ -50,7 +48,10 @@ def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tupl
         for library in candidates:
             if is_intact(library):
                 _in_use.add(library)
-                _mark_used(library)
+                with contextlib.suppress(OSError):  # read-only, e.g. in an image
+                    # The time of use, which `_sweep` reads.
+                    if library.stat().st_mtime < time.time() - _USE_RESOLUTION:
+                        os.utime(library)
                 return library, tuple(damaged)
             damaged.append(library)
     return None, tuple(damaged)
@@ -115,13 +116,6 @@ def _flush(path: Path) -> None:
 
 def _checksum_of(library: Path) -> Path:
     return library.with_name(f"{library.name}.sha256")
-
-
-def _mark_used(library: Path) -> None:
-    """Update the modification time, which `_sweep` reads."""
-    with contextlib.suppress(OSError):  # read-only, e.g. in an image
-        if library.stat().st_mtime < time.time() - _USE_RESOLUTION:
-            os.utime(library)
 
 
 def _directories() -> Iterator[Path]:
@@ -225,7 +219,7 @@ def _size_limit() -> int:
 
 def _sweep(directory: Path, size: int) -> None:
     """Remove leftovers of dead processes, and libraries that have not been used for long."""
-    oldest = time.time() - KEPT_UNUSED_DAYS * _DAY
+    oldest = time.time() - KEPT_UNUSED_DAYS * 86400.0
     with contextlib.suppress(OSError):
         for path in sorted(directory.iterdir()):
             match = _OWN_FILE.fullmatch(path.name)
@@ -248,8 +242,12 @@ def _sweep(directory: Path, size: int) -> None:
 def _remove_unlocked(path: Path, stem: str) -> None:
     """Remove a file unless a process that builds its library holds the lock."""
     with contextlib.suppress(OSError), _locked(path.with_name(f"{stem}.lock"), wait=False) as held:
-        if held:
-            _remove(path)
+        if held and path.is_dir():
+            shutil.rmtree(path)
+        elif held:
+            path.unlink(missing_ok=True)
+            if path.suffix == ".so":
+                _checksum_of(path).unlink(missing_ok=True)
 
 
 def _is_leftover(path: Path, oldest: float) -> bool:
@@ -258,12 +256,3 @@ def _is_leftover(path: Path, oldest: float) -> bool:
     if path.suffix == ".sha256":
         return not path.with_suffix("").exists()
     return True
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-        return
-    path.unlink(missing_ok=True)
-    if path.suffix == ".so":
-        _checksum_of(path).unlink(missing_ok=True)

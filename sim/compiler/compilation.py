@@ -19,7 +19,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -140,16 +140,13 @@ class Compiler(NamedTuple):
 
     def flags(self, aim: Target) -> tuple[str, ...]:
         """Return the flags for a target; Zig spells levels in its own way."""
-        flags = FLAGS if self._is_clang else (*FLAGS, *SCHEDULING)
+        clang = _is_zig(self.command) or "clang" in self.version.lower()
+        flags = FLAGS if clang else (*FLAGS, *SCHEDULING)
         if not aim.level:
             return flags
         if _is_zig(self.command):
             return (*flags, "-mcpu=" + aim.level.replace("-", "_"))
         return (*flags, f"-march={aim.level}")
-
-    @property
-    def _is_clang(self) -> bool:
-        return _is_zig(self.command) or "clang" in self.version.lower()
 
 
 def find_compiler(architecture: str = "") -> Compiler | None:
@@ -162,7 +159,16 @@ def find_compiler(architecture: str = "") -> Compiler | None:
 def _find(architecture: str, native: bool) -> Compiler | None:
     if platform.system() == "Windows":
         return None
-    for command in _for_this_machine() if native else _for_another(architecture):
+    zig: list[str] = []
+    if importlib.util.find_spec("ziglang"):
+        zig = [sys.executable, "-m", "ziglang", "cc"]
+    if native:
+        commands = [shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"], zig]
+    else:
+        system = ["-target", f"{architecture}-linux-gnu"]
+        commands = [[f"{architecture}-linux-gnu-gcc"], zig and [*zig, *system]]
+        commands.append(["zig", "cc", *system])
+    for command in filter(None, commands):
         version = _version(command)
         if version:
             return Compiler(tuple(command), version)
@@ -197,28 +203,12 @@ def run_compiler(
         raise KernelBuildError(f"{command} did not {purpose}:\n{done.stderr[-2000:]}")
 
 
-def _for_this_machine() -> Iterable[list[str]]:
-    yield from (shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"])
-    yield from _zig()
-
-
-def _for_another(architecture: str) -> Iterable[list[str]]:
-    yield [f"{architecture}-linux-gnu-gcc"]
-    for zig in (*_zig(), ["zig", "cc"]):
-        yield [*zig, "-target", f"{architecture}-linux-gnu"]
-
-
-def _zig() -> Iterable[list[str]]:
-    if importlib.util.find_spec("ziglang"):
-        yield [sys.executable, "-m", "ziglang", "cc"]
-
-
 def _is_zig(command: Sequence[str]) -> bool:
     return "ziglang" in command or Path(command[0]).name == "zig"
 
 
 def _version(command: Sequence[str]) -> str:
-    if not command or not shutil.which(command[0]):
+    if not shutil.which(command[0]):
         return ""
     try:
         done = _run([*command, "--version"], _PROBE_LIMIT)
@@ -323,9 +313,12 @@ def build_library(
     )
     hashed.update(identity)
     digest = hashed.hexdigest()[:24]
-    stem = f"{_safe(name)}-{digest}"
-    compiler = find_compiler(aim.architecture)
-    file = f"{stem}-{'*' if compiler is None else _signature(compiler)}.so"
+    # A part of a file name, of any robot's name.
+    stem = f"{re.sub(r'[^A-Za-z0-9_-]+', '_', name)[:80]}-{digest}"
+    compiler, signature = find_compiler(aim.architecture), "*"
+    if compiler is not None:
+        signature = hashlib.sha256(compiler.version.encode()).hexdigest()[:8]
+    file = f"{stem}-{signature}.so"
     library, damaged = cache.find(file, directory)
     if library is None and directory is None and not os.environ.get("CC"):
         # Whichever robot it was built for.
@@ -350,12 +343,3 @@ def build_library(
         run_compiler(compiler, arguments, built.parent, f"compile {stem}", time_limit)
 
     return cache.build(stem, file, make, directory)
-
-
-def _signature(compiler: Compiler) -> str:
-    return hashlib.sha256(compiler.version.encode()).hexdigest()[:8]
-
-
-def _safe(name: str) -> str:
-    """Make a part of a file name of any robot name."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:80]

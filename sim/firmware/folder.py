@@ -146,11 +146,6 @@ def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
     return "\n".join(lines)
 
 
-def expected_header(law: LawIntegers, walks: int, legs: int) -> str:
-    """`test/expected.h`: numbers of compared walks and tables."""
-    return filled("test/expected.h", legs=legs, walks=walks, tables=len(law.tables))
-
-
 def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
     """`test/expected.c`: files of walks, and hashes of tables."""
     tables = [
@@ -375,7 +370,9 @@ def firmware_of(
         "law.h": law_header(integers),
         "tables.c": tables_source(integers),
         "trajectories.c": trajectories_source(trajectories),
-        "test/expected.h": expected_header(integers, len(logs), legs),
+        "test/expected.h": filled(
+            "test/expected.h", legs=legs, walks=len(logs), tables=len(integers.tables)
+        ),
         "test/expected.c": expected_source(integers, {f: log.ticks for f, log in walks.items()}),
         "README.md": readme(label, controller, memory, trajectories, names, robot_option),
         **scenario_files,

@@ -88,13 +88,12 @@ def _convex_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]
     for direction in (ordered, ordered[::-1]):
         half: list[tuple[float, float]] = []
         for x, y in direction:
-            while len(half) > 1 and _turn(half[-2], half[-1], (x, y)) <= 0.0:
+            # Drop corners at which the path does not turn left.
+            while len(half) > 1:
+                (ax, ay), (bx, by) = half[-2:]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
                 half.pop()
             half.append((x, y))
         halves.append(half[:-1])
     return halves[0] + halves[1]
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Positive if the path from a over b to c turns left."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

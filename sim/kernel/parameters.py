@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -49,14 +48,12 @@ class ContactData:
 
 _NORMAL: Final = ("stiffness", "damping", "sole", "friction")
 
-CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
-    {
-        "linear_zone": ContactData((*_NORMAL, "slip_velocity")),
-        "karnopp": ContactData((*_NORMAL, "stick_velocity")),
-        "stick": ContactData((*_NORMAL, "stick_stiffness", "stick_damping"), 2),
-        "dead_zone": ContactData((*_NORMAL, "slip_velocity", "stick_velocity")),
-    }
-)
+CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = {
+    "linear_zone": ContactData((*_NORMAL, "slip_velocity")),
+    "karnopp": ContactData((*_NORMAL, "stick_velocity")),
+    "stick": ContactData((*_NORMAL, "stick_stiffness", "stick_damping"), 2),
+    "dead_zone": ContactData((*_NORMAL, "slip_velocity", "stick_velocity")),
+}
 """By name; the formulas are in `gaitswarm.sim.kernel.dynamics.contact`."""
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from types import MappingProxyType
 from typing import Final, Literal
 
 from gaitswarm.sim.errors import SimulationInputError
@@ -18,19 +17,15 @@ OWN: Final = "gaitswarm"
 ENGINE: Final = "engine"
 """Name of the column of worlds that selects the engine."""
 
-ENGINES: Final[Mapping[EngineName, str]] = MappingProxyType(
-    {
-        "mujoco": "MuJoCo's rigid bodies and integrator, under our laws of contact",
-        "mujoco-contacts": "MuJoCo's rigid bodies, integrator and contacts: spheres on the ground,"
-        " as stiff, damped and rough as our soles",
-    }
-)
+ENGINES: Final[Mapping[EngineName, str]] = {
+    "mujoco": "MuJoCo's rigid bodies and integrator, under our laws of contact",
+    "mujoco-contacts": "MuJoCo's rigid bodies, integrator and contacts: spheres on the ground, as"
+    " stiff, damped and rough as our soles",
+}
 """Descriptions by name."""
 
 LIBRARY: Final = "mujoco-core"
 """The distribution that provides all of them."""
-
-_MODULE: Final = "mujoco"
 
 
 def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
@@ -46,7 +41,7 @@ def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
 
 def check_installed() -> None:
     """Check that the engines' library is installed, without importing it."""
-    if find_spec(_MODULE) is None:
+    if find_spec("mujoco") is None:
         raise SimulationInputError(
             f"mujoco requires {LIBRARY}, not installed here: pip install 'gaitswarm[mujoco]'"
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 import casadi as ca
@@ -202,6 +201,9 @@ def dead_zone(
     return Reaction(force, foot.resisting(drag, further))
 
 
-FRICTION: Final[Mapping[ContactLaw, Friction]] = MappingProxyType(
-    {"linear_zone": linear_zone, "karnopp": karnopp, "stick": stick, "dead_zone": dead_zone}
-)
+FRICTION: Final[Mapping[ContactLaw, Friction]] = {
+    "linear_zone": linear_zone,
+    "karnopp": karnopp,
+    "stick": stick,
+    "dead_zone": dead_zone,
+}

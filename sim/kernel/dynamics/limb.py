@@ -44,7 +44,7 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
 )
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS
 from gaitswarm.sim.robot.bounds import ContactLaw
-from gaitswarm.sim.robot.limbs import Limb, LimbJoint
+from gaitswarm.sim.robot.limbs import Limb
 
 Scalars = tuple[Scalar, ...]
 
@@ -257,21 +257,13 @@ def turns(limb: Limb, angles: Sequence[Scalar]) -> tuple[Scalars, Scalars]:
 
 
 def links_of(limb: Limb, sines: Scalars, cosines: Scalars, rates: Sequence[Scalar]) -> list[Link]:
-    return [
-        Link(
-            axis=joint.axis,
-            rotation=Rotation(joint.rotation, joint.axis, sine, cosine),
-            offset=joint.offset,
-            body=_body(joint),
-            rate=joint.sign * rate,
-        )
-        for joint, sine, cosine, rate in zip(limb.joints, sines, cosines, rates, strict=True)
-    ]
-
-
-def _body(joint: LimbJoint) -> RigidBody:
-    xx, yy, zz, xy, xz, yz = joint.angular
-    return RigidBody(joint.mass, joint.moment, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    links = []
+    for j, sine, cosine, rate in zip(limb.joints, sines, cosines, rates, strict=True):
+        xx, yy, zz, xy, xz, yz = j.angular
+        body = RigidBody(j.mass, j.moment, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+        rotation = Rotation(j.rotation, j.axis, sine, cosine)
+        links.append(Link(j.axis, rotation, j.offset, body, j.sign * rate))
+    return links
 
 
 def _drives(

@@ -43,10 +43,6 @@ class Gait:
         """Share of support at which a foot lifts off when another one has touched down [1]."""
         return 0.5 if self.swinging is None else 1.0 - self.swinging / legs
 
-    @property
-    def legs_in_words(self) -> str:
-        return " or ".join(map(str, self.legs)) if self.legs else "any"
-
 
 def _places(rows: Rows) -> Iterator[tuple[int, int, int, int]]:
     """Leg, side (0 left, 1 right), place from the front, and the number of legs on its side."""
@@ -156,9 +152,9 @@ def lags_of(gait: Gait, legs: Sequence[LegKinematics]) -> tuple[float, ...]:
         fitting = ", ".join(name for name, other in GAITS.items() if suits(other, legs))
         left, right = rows_of(legs)
         raise SimulationInputError(
-            f"gait: {gait.name} is for {gait.legs_in_words} legs, half of them on each side, not"
-            f" for {len(left)} on the left and {len(right)} on the right; choose {fitting}, or"
-            " custom phases"
+            f"gait: {gait.name} is for {' or '.join(map(str, gait.legs))} legs, half of them on"
+            f" each side, not for {len(left)} on the left and {len(right)} on the right; choose"
+            f" {fitting}, or custom phases"
         )
     lags = gait.lags(rows_of(legs))
     return tuple(lags[leg] for leg in range(len(legs)))

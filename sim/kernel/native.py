@@ -143,16 +143,15 @@ class Addresses:
         self._arrays: dict[int, tuple[int, NDArray[Any], NDArray[Any]]] = {}
         self._laws: dict[int, tuple[_Law, ControlLaw]] = {}
 
-    def of(self, array: NDArray[Any], dtype: Any) -> int:
+    def of(self, array: NDArray[Any] | None, dtype: Any = np.float64) -> int | None:
+        if array is None:
+            return None
         cached = self._arrays.get(id(array))
         if cached is None:
             contiguous = np.ascontiguousarray(array, dtype=dtype)
             cached = int(contiguous.ctypes.data), contiguous, array
             self._arrays[id(array)] = cached
         return cached[0]
-
-    def if_any(self, array: Floats | None) -> int | None:
-        return None if array is None else self.of(array, np.float64)
 
     def law(self, law: ControlLaw) -> _Law:
         cached = self._laws.get(id(law))
@@ -170,7 +169,7 @@ class Addresses:
 
     def terrain(self, grid: HeightGrid, corners: Floats) -> _Terrain:
         return _Terrain(
-            self.of(grid.heights, np.float64),
+            self.of(grid.heights),
             grid.cells,
             grid.origin,
             grid.repeated,
@@ -280,12 +279,12 @@ class NativeKernel:
         order = _order(tuple(setup.ticks for setup in setups), self.lanes)
         for walker, k in zip(walkers, order, strict=True):
             setup, record = setups[k], logs[k]
-            walker.q0 = addresses.of(setup.start, np.float64)
-            walker.internal_state = addresses.of(setup.internal_state, np.float64)
-            walker.parameters = addresses.of(setup.parameters, np.float64)
+            walker.q0 = addresses.of(setup.start)
+            walker.internal_state = addresses.of(setup.internal_state)
+            walker.parameters = addresses.of(setup.parameters)
             walker.desired = addresses.of(setup.desired, np.int32)
-            walker.disturbance = addresses.if_any(setup.disturbance)
-            walker.feed_forward = addresses.if_any(setup.feed_forward)
+            walker.disturbance = addresses.of(setup.disturbance)
+            walker.feed_forward = addresses.of(setup.feed_forward)
             if setup.terrain is not None:
                 walker.terrain = addresses.terrain(setup.terrain, setup.corners)
             errors = setup.sensors

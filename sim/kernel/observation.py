@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.walk import WalkSetup, current_smoothing
@@ -35,19 +35,19 @@ class WalkLog:
         supply: voltage of the battery, (T,) [V].
     """
 
-    time: NDArray[np.float64]
-    base_position: NDArray[np.float64]
-    base_orientation: NDArray[np.float64]
-    base_velocity: NDArray[np.float64]
-    joint_angle: NDArray[np.float64]
-    motor_angle: NDArray[np.float64]
-    joint_velocity: NDArray[np.float64]
-    desired_angle: NDArray[np.float64]
-    current: NDArray[np.float64]
-    voltage: NDArray[np.float64]
-    load_torque: NDArray[np.float64]
-    foot_force: NDArray[np.float64]
-    supply: NDArray[np.float64]
+    time: Floats
+    base_position: Floats
+    base_orientation: Floats
+    base_velocity: Floats
+    joint_angle: Floats
+    motor_angle: Floats
+    joint_velocity: Floats
+    desired_angle: Floats
+    current: Floats
+    voltage: Floats
+    load_torque: Floats
+    foot_force: Floats
+    supply: Floats
 
     def until_end(self) -> WalkLog:
         """Return the log without the ticks after an early end."""
@@ -58,7 +58,7 @@ class WalkLog:
         end = len(walked) if walked.all() else int(np.argmin(walked))
         return WalkLog(**{name: column[:end] for name, column in columns.items()})
 
-    def body_acceleration(self) -> NDArray[np.float64]:
+    def body_acceleration(self) -> Floats:
         """Acceleration of the body's origin in its own frame, without gravity, (T, 3) [m/s2].
 
         dv/dt + omega x v of the logged twist, dv/dt by central differences over 4 ms.
@@ -72,38 +72,31 @@ class WalkLog:
 class States(NamedTuple):
     """States logged by a kernel at every tick, after its control; T ticks, J joints."""
 
-    base_position: NDArray[np.float64]
-    """(T, 3) [m]."""
-    base_orientation: NDArray[np.float64]
-    """(T, 4) quaternion x y z w."""
-    joint_angle: NDArray[np.float64]
-    """Of the links, (T, J) [rad]."""
-    base_velocity: NDArray[np.float64]
-    """In the body's frame, (T, 6) [m/s, rad/s]."""
-    joint_velocity: NDArray[np.float64]
-    """(T, J) [rad/s]."""
-    internal_state: NDArray[np.float64]
-    """(T, I)."""
-    sensed_current: NDArray[np.float64]
-    """Absolute, before the converters of the current sensors and their errors, (T, J) [A]."""
-    duty: NDArray[np.float64]
-    """(T, J) [1]."""
+    base_position: Floats  # (T, 3) [m]
+    base_orientation: Floats  # (T, 4) quaternion x y z w
+    joint_angle: Floats  # of the links, (T, J) [rad]
+    base_velocity: Floats  # in the body's frame, (T, 6) [m/s, rad/s]
+    joint_velocity: Floats  # (T, J) [rad/s]
+    internal_state: Floats  # (T, I)
+    # absolute, before the converters of the current sensors and their errors, (T, J) [A]
+    sensed_current: Floats
+    duty: Floats  # (T, J) [1]
 
 
-def split_states(robot: Robot, states: NDArray[np.float64]) -> States:
+def split_states(robot: Robot, states: Floats) -> States:
     n = robot.n_joints
     widths = [3, 4, n, 6, n, internal_state_size(robot), n]
     return States(*np.split(states, np.cumsum(widths), axis=1))
 
 
-def encoder_angles(robot: Robot, states: States) -> NDArray[np.float64]:
+def encoder_angles(robot: Robot, states: States) -> Floats:
     """Return the angles that the encoders see, (T, J) [rad]: those of the motors."""
     if robot.has_backlash:
         return states.internal_state[:, : robot.n_joints]
     return states.joint_angle
 
 
-def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:
+def walk_log(robot: Robot, setup: WalkSetup, states: Floats) -> WalkLog:
     """Compute currents, torques, forces and supply of every tick from its state and duty."""
     feet, ticks = len(robot.legs), len(states)
     parts = split_states(robot, states)
@@ -153,9 +146,7 @@ def _mapped(robot: Robot, function: str, instants: int, *, uneven: bool) -> Any:
     return getattr(physics_model(robot, uneven=uneven), function).map(instants)
 
 
-def sensed_currents(
-    robot: Robot, current: NDArray[np.float64], voltage: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def sensed_currents(robot: Robot, current: Floats, voltage: Floats) -> Floats:
     """Return the inputs of the current sensors' converters: absolute currents behind the low-pass.
 
     Between two ticks the current (T, J) [A] is linear; it ends where the voltage jumps.

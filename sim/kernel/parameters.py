@@ -68,15 +68,6 @@ def internal_state_size(robot: Robot) -> int:
     return motors + law.internal_state_size * len(robot.legs)
 
 
-_OF_THE_BODY: Final = (
-    "base_mass",
-    "base_moment",
-    "base_inertia",
-    "supply_voltage",
-    "supply_resistance",
-)
-
-
 def _has(robot: Robot, friction: str) -> bool:
     """Whether the kernel has this field of dry friction."""
     if friction in DIRECTIONAL_FRICTION:
@@ -121,10 +112,12 @@ class Layout:
             **{name: n_joints * _has(robot, name) for name in DRY_FRICTION},
             **dict.fromkeys(law.parameters, n_feet),
         }
-        limb = {n_joints: JOINTS_PER_LEG, n_feet: 1}
-        whole = ("timestep", "gravity", "push", "displaced", *_OF_THE_BODY)
+        limb, whole = {n_joints: JOINTS_PER_LEG, n_feet: 1}, ("base_", "supply_")
         self.by_limb: Mapping[str, int] = {
-            name: limb.get(length, 0) for name, length in lengths.items() if name not in whole
+            name: limb.get(length, 0)
+            for name, length in lengths.items()
+            if name not in ("timestep", "gravity", "push", "displaced")
+            and not name.startswith(whole)
         }
         self.slices: dict[str, slice] = {}
         start = 0
@@ -153,12 +146,6 @@ class Layout:
         return packed
 
 
-def _towards(direction: float) -> Floats:
-    """Unit vector along the ground; the direction [deg] is counted from x to y."""
-    towards = math.radians(direction)
-    return np.array([math.cos(towards), math.sin(towards), 0.0])
-
-
 def gravity_on(slope: float, direction: float = 0.0) -> Floats:
     """Gravity (3,) [m/s2] for ground that rises by a slope [deg] towards a direction [deg]."""
     angle, towards = math.radians(slope), math.radians(direction)
@@ -185,6 +172,9 @@ def pack_parameters(
             "noise: an angle between gearhead and link needs a robot with elastic_shafts"
         )
     stuck = np.array([leg.name == scenario.stuck_leg for leg in robot.legs], dtype=np.float64)
+    # Counted from x to y.
+    towards = math.radians(scenario.shove_direction)
+    shove = np.array([math.cos(towards), math.sin(towards), 0.0])
     jammed = np.repeat(stuck, JOINTS_PER_LEG)
     angles = np.zeros(robot.n_joints) if start is None else start
     d, body = robot.description, robot.body
@@ -209,7 +199,7 @@ def pack_parameters(
         jam_stiffness=JAM_STIFFNESS * jammed,
         jam_damping=JAM_DAMPING * jammed,
         jam_angle=angles * jammed,
-        push=scenario.shove / SHOVE_DURATION * _towards(scenario.shove_direction),
+        push=scenario.shove / SHOVE_DURATION * shove,
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         displaced=float(displaced) if robot.has_backlash else np.empty(0),
         **{

@@ -161,7 +161,15 @@ def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
         foot = _add_leg(body, robot, leg, drawn)
         if rig.soles != "none":
             radius = surroundings.contacts[leg].sole
-            _add_sole(foot, robot, leg, repr(radius) if rig.soles == "spheres" else _POINT)
+            name = robot.description.legs[leg].foot
+            _add_geom(
+                foot,
+                "foot",
+                name=f"{name}_sole",
+                type="sphere",
+                size=repr(radius) if rig.soles == "spheres" else _POINT,
+                pos=_numbers(robot.urdf.place(name).position),
+            )
     feet = [leg.foot for leg in robot.description.legs]
     if rig.soles != "none":
         _add_pairs(root, world, feet, surroundings.contacts, rig)
@@ -242,20 +250,10 @@ def _add_leg(
     return parent
 
 
-def _add_sole(tibia: ET.Element, robot: Robot, number: int, radius: str) -> None:
-    foot = robot.description.legs[number].foot
-    ET.SubElement(
-        tibia,
-        "geom",
-        name=f"{foot}_sole",
-        type="sphere",
-        size=radius,
-        pos=_numbers(robot.urdf.place(foot).position),
-        contype="0",
-        conaffinity="0",
-        mass="0",
-        rgba=_COLOURS["foot"],
-    )
+def _add_geom(body: ET.Element, colour: str, **attributes: str) -> None:
+    """Add a shape that is seen, without contacts of its own."""
+    unseen = {"contype": "0", "conaffinity": "0", "mass": "0", "rgba": _COLOURS[colour]}
+    ET.SubElement(body, "geom", attributes | unseen)
 
 
 def _add_inertia(body: ET.Element, inertia: BodyInertia) -> None:
@@ -283,17 +281,13 @@ def _add_shapes(body: ET.Element, shapes: Sequence[Shape]) -> None:
         halves = np.array(shape.size) * {"box": [0.5] * 3, "sphere": [1.0]}.get(
             shape.type, [1.0, 0.5]
         )
-        ET.SubElement(
+        _add_geom(
             body,
-            "geom",
+            shape.role,
             type=shape.type,
             size=_numbers(halves),
             pos=_numbers(at),
             quat=_numbers([w, x, y, z]),
-            contype="0",
-            conaffinity="0",
-            mass="0",
-            rgba=_COLOURS[shape.role],
         )
 
 

@@ -157,9 +157,6 @@ def free_acceleration(inertia: Inertia, force: Force) -> Motion:
     return Motion((-x, -y, -z), angular)
 
 
-Scalars = tuple[Scalar, ...]
-
-
 def body_state(q: Sequence[Scalar], v: Sequence[Scalar], gravity: Sequence[Scalar]) -> LinkState:
     """State of the body; gravity is in the world [m/s2]."""
     attitude = rotation_of(q[3:7])

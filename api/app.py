@@ -19,7 +19,7 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddle
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 
-from gaitswarm.api import access, dependencies, routes
+from gaitswarm.api import access, health, routes
 from gaitswarm.api.access import METRICS_PATH, AccessMiddleware, TokenGuesses
 from gaitswarm.api.dependencies import Component, lifespan
 from gaitswarm.api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
@@ -75,9 +75,9 @@ def create_app(
     app.state.service = service
     app.state.guesses = guesses = TokenGuesses()
     # Routes are added directly: `include_router` would build each of them twice.
-    for router in (routes.router, access.router, dependencies.router):
+    for router in (routes.router, access.router, health.router):
         app.router.routes.extend(router.routes)
-    dependencies.add_short_paths(app)
+    health.add_short_paths(app)
     app.router.routes.append(metrics_route(metrics))
     add_documentation(app)
     add_page(app, page_folder)

@@ -23,6 +23,7 @@ from gaitswarm.api.events import EVENTS, EventsQuery, EventStream, job_events
 from gaitswarm.jobs.base import job_view
 from gaitswarm.jobs.operation import LARGEST_INDEX, OPERATIONS, Context, Limits, Operation
 from gaitswarm.operations import ServedJobs
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import (
@@ -31,7 +32,6 @@ from gaitswarm.services.optimizer.jobs.job import (
     LOWEST_PRIORITY,
     Job,
 )
-from gaitswarm.services.optimizer.jobs.listing import LOCAL
 from gaitswarm.services.optimizer.jobs.notification import check_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.errors import RobotFileError

@@ -14,9 +14,9 @@ from gaitswarm.cli.progress import Progress, show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, verdict_lines, worth
 from gaitswarm.jobs.database import DatabaseJobs, check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
-from gaitswarm.services.optimizer.access import masked_url
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import (
     check_address,
@@ -30,7 +30,7 @@ from gaitswarm.views.job import JobSummaryView
 
 if TYPE_CHECKING:
     from gaitswarm.cli.options import WorkerOptions
-    from gaitswarm.services.optimizer.analysis.reference import VerdictView
+    from gaitswarm.services.optimizer.analysis.verdict import VerdictView
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
     from gaitswarm.services.optimizer.jobs.spec import Spec

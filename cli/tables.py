@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         ObjectiveView,
         ScenarioResultView,
     )
-    from gaitswarm.services.optimizer.analysis.reference import FigureView, VerdictView
+    from gaitswarm.services.optimizer.analysis.verdict import FigureView, VerdictView
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -333,7 +333,7 @@ def verdict_table(verdict: VerdictView) -> Table:
 
 
 def _change(figure: FigureView | None) -> tuple[str, str]:
-    from gaitswarm.services.optimizer.analysis.reference import percentage
+    from gaitswarm.services.optimizer.analysis.verdict import percentage
 
     if figure is None:
         return MISSING, ""

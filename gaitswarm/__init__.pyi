@@ -10,16 +10,17 @@ from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
 from gaitswarm.services.optimizer.analysis.front import FrontView
-from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView, TargetsView
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     CandidatePreferencesView,
     PreferenceForView,
     RankingView,
 )
-from gaitswarm.services.optimizer.analysis.reference import VerdictView
 from gaitswarm.services.optimizer.analysis.robustness import RobustnessView
 from gaitswarm.services.optimizer.analysis.surface import SurfaceView
+from gaitswarm.services.optimizer.analysis.targets import TargetsView
+from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,

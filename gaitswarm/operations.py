@@ -52,10 +52,10 @@ from gaitswarm.services.optimizer.analysis.robustness import RobustnessRequest, 
 from gaitswarm.services.optimizer.analysis.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
 from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.jobs.audit import AuditEntryView
 from gaitswarm.services.optimizer.jobs.designs import SimulationRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import JobFacetsView
-from gaitswarm.services.optimizer.jobs.listing import AuditEntryView
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.catalogue import design_numbers

@@ -11,7 +11,7 @@ import numpy as np
 
 from gaitswarm.jobs.database import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
-from gaitswarm.services.optimizer.analysis.reference import VerdictView
+from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.errors import GaitswarmError, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.iteration import SUMMARY
 from gaitswarm.services.optimizer.jobs.job import JobState

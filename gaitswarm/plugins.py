@@ -9,8 +9,9 @@ from gaitswarm.services.optimizer.search.optimizer import (
     Start,
 )
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, SwarmSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import Method, create_search, from_generator
-from gaitswarm.services.optimizer.search.space import Axis, RandomNumbers, Space
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.case_registry import CaseFamily, CaseSettings
 from gaitswarm.sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, Response

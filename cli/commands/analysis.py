@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.services.optimizer.analysis.distribution import FailuresView
+    from gaitswarm.services.optimizer.analysis.failures import FailuresView
     from gaitswarm.services.optimizer.analysis.front import (
         FrontView,
         FrontWinnerView,

@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.analysis.identifiability import (
         IdentifiabilityView,
         ParameterView,
-        ReachedView,
-        TargetsView,
     )
+    from gaitswarm.services.optimizer.analysis.targets import ReachedView, TargetsView
     from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk, Synchronised
     from gaitswarm.sim.robot.robot import Robot
 

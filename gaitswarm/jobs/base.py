@@ -593,11 +593,11 @@ class Jobs(ABC):
                 its best design, or a design as a JSON object of its variables.
         """
         from gaitswarm.services.optimizer.analysis.reference import (
-            verdict,
             with_other_reference,
             with_reference,
         )
         from gaitswarm.services.optimizer.analysis.utilities import tuning_spec
+        from gaitswarm.services.optimizer.analysis.verdict import verdict
         from gaitswarm.services.optimizer.jobs.estimate import duration
 
         job = self._service.job(job_id)
@@ -724,7 +724,7 @@ class Jobs(ABC):
     @analysis("GET /jobs/{job_id}/failures", "get_failures", "Get the failures of designs")
     def failures(self, job_id: str) -> types.FailuresView:
         """Count the failed designs of a job by case and status, from stored statuses."""
-        from gaitswarm.services.optimizer.analysis.distribution import failures
+        from gaitswarm.services.optimizer.analysis.failures import failures
 
         job = self._service.job(job_id)
         return failures(self._service.columns(job), job.spec.case_names)
@@ -896,10 +896,8 @@ class Jobs(ABC):
         Raises:
             Conflict: One of them has no feasible design yet.
         """
-        from gaitswarm.services.optimizer.analysis.identifiability import (
-            check_comparable,
-            target_results,
-        )
+        from gaitswarm.services.optimizer.analysis.identifiability import check_comparable
+        from gaitswarm.services.optimizer.analysis.targets import target_results
         from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
         jobs = [self._service.job(job_id) for job_id in job_ids]

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission, job_view
 from gaitswarm.jobs.operation import Operation
-from gaitswarm.services.optimizer.access import masked_url
 from gaitswarm.services.optimizer.errors import (
     Conflict,
     InvalidRequest,
@@ -25,6 +24,7 @@ from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.listing import every
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.tables import EvaluationTable

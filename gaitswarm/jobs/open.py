@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from urllib.parse import SplitResult, urlsplit
 
-from gaitswarm.services.optimizer.access import masked_url
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
 
 if TYPE_CHECKING:

@@ -27,9 +27,9 @@ from pydantic.fields import FieldInfo
 
 from gaitswarm.docstrings import Docstring, docstring_of
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Quota
-from gaitswarm.services.optimizer.jobs.listing import LOCAL
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.services.optimizer.views import Request
 from gaitswarm.specs import SpecOptions, checked, chosen_spec

@@ -17,7 +17,6 @@ from pydantic import BaseModel, ValidationError
 
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
 from gaitswarm.jobs.operation import Operation
-from gaitswarm.services.optimizer.access import masked_url
 from gaitswarm.services.optimizer.errors import (
     Conflict,
     Forbidden,
@@ -33,6 +32,7 @@ from gaitswarm.services.optimizer.errors import (
 )
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.views.base import PREFIX, ProblemView
 from gaitswarm.views.job import IterationView, JobView, StateView

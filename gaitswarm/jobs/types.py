@@ -3,14 +3,10 @@
 from gaitswarm.recordings import RecordingEntryView, RecordingView
 from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST, CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import MOST_JOBS, JobComparisonView
-from gaitswarm.services.optimizer.analysis.distribution import FailuresView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView
+from gaitswarm.services.optimizer.analysis.failures import FailuresView
 from gaitswarm.services.optimizer.analysis.front import FrontRequest, FrontView
-from gaitswarm.services.optimizer.analysis.identifiability import (
-    IdentifiabilityView,
-    LeaveOut,
-    TargetsView,
-)
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     CandidatePreferencesView,
@@ -18,7 +14,8 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     RankingRequest,
     RankingView,
 )
-from gaitswarm.services.optimizer.analysis.reference import VerdictView
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
+from gaitswarm.services.optimizer.analysis.verdict import VerdictView
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec

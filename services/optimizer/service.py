@@ -19,6 +19,7 @@ from gaitswarm.services.optimizer.analysis.fork import (
 )
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.errors import ProvenanceChanged, within
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import checked_spec
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
@@ -33,7 +34,6 @@ from gaitswarm.services.optimizer.jobs.job import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import other_measure
-from gaitswarm.services.optimizer.jobs.listing import LOCAL
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 

@@ -9,12 +9,10 @@ import pytest
 
 from gaitswarm.services.optimizer.analysis.identifiability import (
     IdentifiabilityView,
-    LeaveOut,
-    TargetsView,
     Trust,
     identifiability,
-    target_results,
 )
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns, Reevaluation
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.sim.outcome import RESULTS

@@ -12,8 +12,9 @@ import pytest
 
 import gaitswarm
 from gaitswarm.services.optimizer.search.optimizer import Proposals, Replayed
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import METHODS
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space
+from gaitswarm.services.optimizer.search.space import Space
 from tests.examples.walks import SHORT_WALK
 
 UNEVEN_SPEC: Final[dict[str, Any]] = {

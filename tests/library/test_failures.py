@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from gaitswarm.services.optimizer.analysis.distribution import failures
+from gaitswarm.services.optimizer.analysis.failures import failures
 from gaitswarm.sim.outcome import Status
 from tests.examples.columns import columns_of
 from tests.examples.commands import run_command

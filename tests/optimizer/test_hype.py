@@ -17,7 +17,8 @@ from gaitswarm.services.optimizer.search.hype import (
     SampledHypervolume,
     pareto_ranks,
 )
-from gaitswarm.services.optimizer.search.space import Axis, RandomNumbers, Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
 

@@ -19,8 +19,9 @@ from gaitswarm.services.optimizer.search.pso import (
     absorb,
     reflect,
 )
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.variables import Variable
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]

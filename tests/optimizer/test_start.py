@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.search.hype import Hype
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, Proposals, Replayed, Start
 from gaitswarm.services.optimizer.search.pso import PsoSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.registry import (
     METHODS,
     RandomSearchSettings,
     create_search,
 )
-from gaitswarm.services.optimizer.search.space import Axis, RandomNumbers, Space
+from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.bounds import LimitView, WidenedView
-from gaitswarm.services.optimizer.analysis.reference import (
+from gaitswarm.services.optimizer.analysis.verdict import (
     QUANTITIES,
     QuantityView,
     bounds_in_words,

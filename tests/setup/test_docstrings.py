@@ -13,7 +13,8 @@ import gaitswarm
 import gaitswarm.plugins
 from gaitswarm.services.optimizer.run import evaluator
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.optimizer.store.changes import Changes, Outbox
+from gaitswarm.services.optimizer.store.changes import Changes
+from gaitswarm.services.optimizer.store.outbox import Outbox
 from gaitswarm.services.optimizer.store.tokens import Tokens
 
 INTERFACES = (gaitswarm, gaitswarm.plugins, evaluator, Store, Changes, Outbox, Tokens)

@@ -18,7 +18,7 @@ SHORT = """
 import os, resource
 import numpy as np
 from gaitswarm.services.optimizer.run.outage import is_infrastructure
-from gaitswarm.services.optimizer.search.space import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.gait.trajectory import fir_gains
 
 def limit(mebibytes):

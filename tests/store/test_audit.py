@@ -10,8 +10,8 @@ import pytest
 
 from gaitswarm.services.optimizer.access import Scope
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.audit import AuditAction
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.jobs.listing import AuditAction
 from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_recordings import recording

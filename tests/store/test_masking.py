@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.jobs.database import DatabaseJobs
-from gaitswarm.services.optimizer.access import masked_url
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.settings import Settings

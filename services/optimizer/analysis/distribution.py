@@ -1,9 +1,7 @@
-"""Statistics of designs: spread by iteration, failures by case, plots, ranks and resamples"""
+"""Spread of designs by iteration, and designs thinned for plots"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -21,39 +19,10 @@ from gaitswarm.services.optimizer.views import (
     IterationIndex,
     JobName,
     NextPage,
-    Particle,
-    StatusName,
     View,
     framed,
 )
 from gaitswarm.sim.arrays import Floats
-from gaitswarm.sim.outcome import Status
-
-CONFIDENCE: Final = 0.95
-"""Level of intervals."""
-
-
-def spearman(first: Floats, second: Floats) -> float:
-    """Spearman's rank correlation of two samples (M,); ties share their mean rank."""
-    a, b = (average_ranks(values) for values in (first, second))
-    a, b = a - a.mean(), b - b.mean()
-    scale = math.sqrt(float((a * a).sum()) * float((b * b).sum()))
-    return float((a * b).sum()) / scale if scale > 0.0 else math.nan
-
-
-def average_ranks(values: Floats) -> Floats:
-    """Ranks of (n,) values from 1, the least; ties share their mean rank."""
-    _, places, sizes = np.unique(values, return_inverse=True, return_counts=True)
-    means = np.cumsum(sizes) - 0.5 * (sizes - 1.0)
-    return np.asarray(means[places])
-
-
-def resample_weights(draws: Floats) -> Floats:
-    """(1 + B, n) multiplicity of each row: first 1, then in a bootstrap by draws (B, n) < 1."""
-    rows = draws.shape[1]
-    picks = (draws * rows).astype(np.intp)
-    return np.vstack([np.ones(rows), *(np.bincount(row, minlength=rows) for row in picks)])
-
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
@@ -228,72 +197,3 @@ def encoded_particles(
     table = np.stack(numbers).astype(np.float64)
     table[~np.isfinite(table)] = np.nan
     return framed(header, table)
-
-
-class StatusFailuresView(View):
-    """Designs that end with one status in a case."""
-
-    status: StatusName = Field(description="Status of their simulations.", examples=["fell"])
-    reason: str = Field(description="The status in words, with a remedy.")
-    designs: int = Field(description="Number of these designs.", examples=[12])
-    iteration: IterationIndex
-    particle: Particle
-
-
-class CaseFailuresView(View):
-    """Designs that fail in one case."""
-
-    case: str = Field(description="Name of the scenario, world or walk.", examples=["loaded-fast"])
-    failed: int = Field(description="Designs that fail in this case.", examples=[14])
-    alone: int = Field(description="Designs that fail in this case alone.")
-    statuses: list[StatusFailuresView]
-    """Most frequent first, each with its latest design."""
-
-
-class FailuresView(View):
-    """Failures of a job's designs, by case."""
-
-    designs: int = Field(description="Evaluated designs.", examples=[625])
-    failed: int = Field(description="Designs that fail in at least one case.")
-    recent: float | None
-    """Share of failed designs in the latest quarter of the designs [1]; null without designs."""
-    cases: list[CaseFailuresView] = Field(description="Cases with failures, most failures first.")
-
-
-def failures(columns: EvaluationColumns, case_names: Sequence[str]) -> FailuresView:
-    """Count the failures of designs by case and status."""
-    failed = columns.failed
-    of_designs = np.asarray(failed.any(axis=1))
-    cases = []
-    for case in np.argsort(-failed.sum(axis=0), kind="stable").tolist():
-        statuses = columns.statuses[:, case]
-        values, counts = np.unique(statuses[failed[:, case]], return_counts=True)
-        if not len(values):
-            break
-        latest = {int(value): int(np.flatnonzero(statuses == value)[-1]) for value in values}
-        cases.append(
-            CaseFailuresView(
-                case=case_names[case],
-                failed=int(counts.sum()),
-                alone=int((failed[:, case] & (failed.sum(axis=1) == 1)).sum()),
-                statuses=[
-                    StatusFailuresView(
-                        status=Status(value).label,
-                        reason=Status(value).phrase,
-                        designs=count,
-                        iteration=int(columns.iteration[latest[value]]),
-                        particle=int(columns.particle[latest[value]]),
-                    )
-                    for count, value in sorted(
-                        zip(counts.tolist(), values.tolist(), strict=True), reverse=True
-                    )
-                ],
-            )
-        )
-    latest_quarter = of_designs[-max(1, len(columns) // 4) :]
-    return FailuresView(
-        designs=len(columns),
-        failed=int(of_designs.sum()),
-        recent=float(latest_quarter.mean()) if len(columns) else None,
-        cases=cases,
-    )

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.constraints import Constraints
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import WEIGHED, WEIGHED_NAMES
-from gaitswarm.services.optimizer.search.space import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import (
     DesignValues,
     Finite,

@@ -21,18 +21,18 @@ from gaitswarm.services.optimizer.analysis.bounds import (
     bound_at,
     with_wider_bounds,
 )
-from gaitswarm.services.optimizer.analysis.distribution import (
+from gaitswarm.services.optimizer.analysis.distribution import thinned
+from gaitswarm.services.optimizer.analysis.statistics import (
     CONFIDENCE,
     average_ranks,
     resample_weights,
-    thinned,
 )
 from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import WEIGHED_NAMES
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.search.space import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.variables import Variable

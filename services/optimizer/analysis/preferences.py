@@ -12,9 +12,10 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.distribution import iteration_starts, spearman
+from gaitswarm.services.optimizer.analysis.distribution import iteration_starts
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
 from gaitswarm.services.optimizer.analysis.front import Rows, TradeOffDesignView, design_fields
+from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.analysis.utilities import (
     NAMED,
     PreferenceOwner,
@@ -38,7 +39,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import (
 )
 from gaitswarm.services.optimizer.jobs.labels import OWN, preference_name
 from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceChoice
-from gaitswarm.services.optimizer.search.space import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.views import (
     DesignValues,
     Finite,

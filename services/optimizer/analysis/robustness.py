@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.distribution import CONFIDENCE, resample_weights
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
+from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, resample_weights
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.designs import WalksRequest
 from gaitswarm.services.optimizer.jobs.preference import WEIGHED, WEIGHED_NAMES, by_design
@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.jobs.sensitivity import (
     slopes_and_squares,
     usable_rows,
 )
-from gaitswarm.services.optimizer.search.space import swarm_uniform
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.services.optimizer.views import DesignValues, Finite, View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.catalogue import design_catalogue, design_shown

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.kinds.preferences import PreferencesSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.jobs.time_left import EstimateView
-from gaitswarm.services.optimizer.search.space import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.simulate import prepare

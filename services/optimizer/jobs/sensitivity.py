@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.search.space import swarm_uniform
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.variables import Variable
 

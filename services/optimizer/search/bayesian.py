@@ -12,7 +12,8 @@ from pydantic import Field
 from gaitswarm.services.optimizer.search.cma_es import CmaEs, CmaEsSettings
 from gaitswarm.services.optimizer.search.differential_evolution import latin_hypercube
 from gaitswarm.services.optimizer.search.optimizer import Proposals, SearchSettings, Start
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space, normal_quantiles
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, normal_quantiles
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.memory import require_room_for_scipy
 

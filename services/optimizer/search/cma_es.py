@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, PositiveFloat
 
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space, normal_quantiles
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, normal_quantiles
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 
 _SAMPLE: Final = 5

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 
 _EVOLVE: Final = 4

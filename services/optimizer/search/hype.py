@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from gaitswarm.services.optimizer.search import differential_evolution as de
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.space import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.arrays import Floats
 
 Indices = NDArray[np.intp]

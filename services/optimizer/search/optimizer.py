@@ -37,7 +37,8 @@ from pydantic import (
     ValidationInfo,
 )
 
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.input import Data, message_of
 

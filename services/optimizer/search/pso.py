@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
 from gaitswarm.services.optimizer.search import optimizer as base
-from gaitswarm.services.optimizer.search.space import Space, swarm_uniform
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.arrays import Floats
 
 _SCATTER: Final = 1

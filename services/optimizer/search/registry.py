@@ -25,7 +25,8 @@ from gaitswarm.services.optimizer.search.optimizer import (
     SearchSettings,
 )
 from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
-from gaitswarm.services.optimizer.search.space import RandomNumbers, Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim import plugins
 from gaitswarm.sim.arrays import Floats
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gaitswarm.services.optimizer.store.changes import Changes, Outbox
+from gaitswarm.services.optimizer.store.changes import Changes
 from gaitswarm.services.optimizer.store.engine import (
     Clock,
     Database,
@@ -13,6 +13,7 @@ from gaitswarm.services.optimizer.store.engine import (
 from gaitswarm.services.optimizer.store.history import History
 from gaitswarm.services.optimizer.store.jobs import Jobs
 from gaitswarm.services.optimizer.store.leases import Leases
+from gaitswarm.services.optimizer.store.outbox import Outbox
 from gaitswarm.services.optimizer.store.recordings import Recordings
 from gaitswarm.services.optimizer.store.schema import admit, check_revision, create
 from gaitswarm.services.optimizer.store.tokens import Audit, Tokens

@@ -18,10 +18,10 @@ from typing import Any, Final, Protocol
 import sqlalchemy as sa
 from sqlalchemy import exc
 
-from gaitswarm.services.optimizer.access import HARMLESS, masked_url
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreReplaced, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
+from gaitswarm.services.optimizer.masking import HARMLESS, masked_url
 
 BUSY_SECONDS: Final = 15.0
 """Longest wait of a transaction for another's lock."""

@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer import errors
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from gaitswarm.services.optimizer.jobs.documents import check_budget
 from gaitswarm.services.optimizer.jobs.fork import Fork
 from gaitswarm.services.optimizer.jobs.job import (
@@ -40,9 +41,6 @@ from gaitswarm.services.optimizer.jobs.labels import (
     robot_name,
 )
 from gaitswarm.services.optimizer.jobs.listing import (
-    LOCAL,
-    RETENTION,
-    AuditAction,
     Page,
     Queue,
     checked_limit,

@@ -14,6 +14,7 @@ from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.jobs import listing
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditAction
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.job_rows import first_problems, unreadable
 from gaitswarm.services.optimizer.store.tables import recordings
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 class Recordings(Aggregate):
     """Recorded walks."""
 
-    def add_recording(self, walk: RecordedWalk, *, actor: str = listing.LOCAL) -> str:
+    def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
         """Store a recorded walk, once, and return its id, a digest of its content."""
         text = walk.model_dump_json()
         recording = hashlib.sha256(text.encode()).hexdigest()[:32]
@@ -49,7 +50,7 @@ class Recordings(Aggregate):
                         synthetic=walk.synthetic,
                     )
                 )
-                action = listing.AuditAction.ADD_RECORDING
+                action = AuditAction.ADD_RECORDING
                 note_change(connection, now, actor, action, recording=recording)
         return recording
 

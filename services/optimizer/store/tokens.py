@@ -11,15 +11,9 @@ from sqlalchemy.exc import IntegrityError
 
 from gaitswarm.services.optimizer.access import Scope, Token, new_secret, secret_digest
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction, AuditEntryView
 from gaitswarm.services.optimizer.jobs.job import ENDED, Quota
-from gaitswarm.services.optimizer.jobs.listing import (
-    LOCAL,
-    RETENTION,
-    AuditAction,
-    AuditEntryView,
-    Page,
-    checked_limit,
-)
+from gaitswarm.services.optimizer.jobs.listing import Page, checked_limit
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.tables import Row, audit, jobs, tokens
 

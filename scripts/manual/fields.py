@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterator
-from typing import Any, get_args, get_origin
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -54,12 +56,25 @@ def _variable(default: object) -> str:
 
 def _row(name: str, field: FieldInfo, described: str) -> str:
     value = None if field.is_required() else field.get_default(call_default_factory=True)
-    kind = getattr(field.annotation, "__name__", None) if not get_args(field.annotation) else None
-    shown = kind or str(field.annotation).replace("typing.", "")
+    bare = _bare(field.annotation)
+    kind = getattr(bare, "__name__", None) if not get_args(bare) else None
+    shown = kind or str(bare).replace("typing.", "")
     for module in ("gaitswarm.sim.robot.description.", "collections.abc."):
         shown = shown.replace(module, "")
     default = code("" if value is None else value)
     return row([code(name), code(shown), default, field.description or described])
+
+
+def _bare(annotation: Any) -> Any:
+    """A type without what validates its values."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _bare(arguments[0])
+    if origin is None or origin is Literal:
+        return annotation
+    if origin in (Union, types.UnionType):
+        return reduce(or_, map(_bare, arguments))
+    return origin[tuple(map(_bare, arguments))]
 
 
 def _inner(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from gaitswarm.api.problems import PROBLEMS
-from scripts.manual.fields import settings
+from gaitswarm.sim.robot.description import RobotDescription
+from scripts.manual.fields import models, settings
 from scripts.manual.rest import routes, schemas
 from tests.examples.api_document import api_document
 from tests.setup import settings_classes
@@ -80,3 +81,8 @@ def test_a_default_is_shown_as_the_variable_would_be_set() -> None:
     assert shown["GAITSWARM_CACHE"] == "true"
     assert shown["GAITSWARM_API_TRUSTED_PROXIES"] == "127.0.0.1,::1"
     assert shown["GAITSWARM_API_MAX_JOB_SECONDS"] == "10000000000"
+
+
+def test_types_of_fields_are_shown_without_their_validators() -> None:
+    text = "\n".join(models(RobotDescription))
+    assert "Validator" not in text and r"`float \| None`" in text

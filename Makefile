@@ -23,8 +23,7 @@ help: ## Show this list.
 demo: setup page-if-possible ## Optimize the thesis's chapter-4 job, then controller and gait, no worse than its optimum.
 	@echo "1. The controller alone, as in the thesis:"
 	@$(BIN)/gaitswarm optimize --name "chapter 4, preference A" --particles 25 --iterations 25 \
-	    --preference A --seed 2 --compare-optimizer pso \
-	    $(DB_OPTION) $(ARGS)
+	    --preference A --seed 2 $(DB_OPTION) $(ARGS)
 	@echo "2. Controller and gait, no worse than the thesis's optimum in any objective of any scenario:"
 	@$(BIN)/gaitswarm optimize --name "controller and gait, no worse than A" --particles 25 --iterations 25 \
 	    --preference A --seed 1 --with-gait --no-worse-than published:A \

@@ -20,9 +20,7 @@ from gaitswarm.views.base import PREFIX, FieldErrorView
 
 _log = logging.getLogger("gaitswarm.api")
 
-
 router = APIRouter(prefix=PREFIX, tags=["operations"])
-
 
 Status = Literal["ok", "degraded", "failed"]
 

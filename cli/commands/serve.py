@@ -90,8 +90,9 @@ def serve(
         robots: Folder of a robot, or of several, whose meshes the page shows to users who can read
             the jobs; repeatable. [env: GAITSWARM_ROBOTS; default: none]
     """
-    from gaitswarm.api.app import ApiServer, create_app
+    from gaitswarm.api.app import create_app
     from gaitswarm.api.page import is_built
+    from gaitswarm.api.server import ApiServer
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
@@ -158,7 +159,7 @@ def runner(options: RunnerOptions) -> None:
     ):
         log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
         if metrics is not None and opened.runner is not None:
-            from gaitswarm.api.app import metrics_server
+            from gaitswarm.api.server import metrics_server
 
             tokens, trouble = lambda: opened.service.store.tokens, opened.runner.trouble
             url = stack.enter_context(metrics_server(metrics, tokens, settings, trouble))

@@ -14,12 +14,9 @@ HARMLESS: Final = frozenset(
 )
 """Query parameters of a database URL that are shown; others may contain a secret or its path."""
 
-
 _HIDDEN: Final = "***"
 
-
 _HOST: Final = r"(?:\[[\w.:%]+\]|[\w.%-]*)(?::\d+)?"
-
 
 _ADDRESS: Final = re.compile(rf"{_HOST}(?:,{_HOST})*(?:/[^:@]*)?")
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from gaitswarm.api.app import ApiServer, create_app
+from gaitswarm.api.app import create_app
+from gaitswarm.api.server import ApiServer
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.settings import Settings

@@ -13,7 +13,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from gaitswarm.api.app import ApiServer, create_app
+from gaitswarm.api.app import create_app
+from gaitswarm.api.server import ApiServer
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store

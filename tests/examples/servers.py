@@ -19,7 +19,8 @@ from fastapi.routing import APIRoute
 from numpy.typing import NDArray
 
 from gaitswarm.api import dependencies
-from gaitswarm.api.app import ApiServer, create_app
+from gaitswarm.api.app import create_app
+from gaitswarm.api.server import ApiServer
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.service import JobService

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import httpx2
 import pytest
 
-from gaitswarm.api.app import metrics_server
+from gaitswarm.api.server import metrics_server
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.access import Scope, Token
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable

@@ -7,7 +7,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -39,12 +39,7 @@ from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.arrays import Floats
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, RESULTS
 
-if TYPE_CHECKING:
-    pass
-
-
 Judgement = Literal["better", "same", "worse"]
-
 
 SAME: Final = 0.005
 """Relative difference up to which two values are the same [1]."""
@@ -79,7 +74,6 @@ QUANTITIES: Final = (
 
 Those that are objectives count as figures.
 """
-
 
 _COLUMNS: Final = tuple(result.name for result in RESULTS)
 

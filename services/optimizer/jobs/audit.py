@@ -14,7 +14,6 @@ LOCAL: Final = "local"
 """Actor without a token: the command line, or a server bound to loopback. No token has this name.
 """
 
-
 RETENTION: Final = "retention"
 """Actor that deletes expired jobs. No token has this name."""
 

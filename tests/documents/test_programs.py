@@ -53,9 +53,10 @@ def test_the_tutorial_does_what_it_says(reader: Reader) -> None:
 
 def test_the_readmes_commands_do_what_they_say(reader: Reader) -> None:
     reader.replaced = {
-        "--iterations 10 ": "--iterations 5 ",
-        "--replay 50": "--replay 5",
-        "--worlds 8 --aggregate cvar": "--worlds 2 --aggregate cvar --iterations 2 --particles 4",
+        "--iterations 10 ": "--iterations 2 --particles 4 ",
+        "--from 10": "--from 2",
+        "--replay 50": "--replay 2",
+        "--worlds 8 --aggregate cvar": "--worlds 2 --aggregate cvar --iterations 1 --particles 2",
     }
     reader.skipped = {"gaitswarm certify": "simulates hundreds of worlds"}
     reader.read("README.md", "Command line")
@@ -64,13 +65,13 @@ def test_the_readmes_commands_do_what_they_say(reader: Reader) -> None:
 
 
 def test_the_readmes_requests_do_what_they_say(reader: Reader) -> None:
-    reader.replaced = {'"iterations": 25': '"iterations": 3'}
+    reader.replaced = {'"iterations": 25': '"iterations": 3, "optimizer": {"particles": 8}'}
     reader.read("README.md", "REST in five requests")
     answers = {str(answer.request.url).rpartition("/")[2]: answer for answer in reader.answers}
     assert answers["pause"].json()["state"] in ("pausing", "paused")
     assert answers["resume"].json()["state"] in ("queued", "running")
     events = answers["events"].text.split("event: state")[-1]
-    assert '"evaluations":75' in events
+    assert '"evaluations":24' in events
     assert '"state":"succeeded"' in events
     assert answers["best"].json()["design"].keys() >= {"I", "FOR"}
 

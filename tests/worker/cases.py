@@ -63,14 +63,16 @@ class Slow(InPlaceOfWalk):
 
 @dataclass(frozen=True, slots=True)
 class Deadly(InPlaceOfWalk):
-    """A design with a negative gain crashes its process, which is noted in a file."""
+    """A walk that crashes its process some times before it is one, each noted in a file."""
 
     deaths: Path
+    times: int
     name = "deadly"
     duration = 1.0
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
-        if (designs < 0.0).any():
+        self.deaths.touch()
+        if len(self.deaths.read_text().split()) < self.times:
             with self.deaths.open("a") as file:
                 file.write(f"{os.getpid()}\n")
             os.kill(os.getpid(), signal.SIGSEGV)

@@ -11,11 +11,34 @@ from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 
+class LocalRay:
+    """Ray on this machine: a process has one at a time."""
+
+    def __init__(self) -> None:
+        self._opened: RayEvaluator | None = None
+
+    def opened(self) -> RayEvaluator:
+        """The one that is open, or begins to be opened."""
+        if self._opened is None:
+            self._opened = RayEvaluator(cpus=2)
+        return self._opened
+
+    def close(self) -> None:
+        if self._opened is not None:
+            self._opened.close()
+        self._opened = None
+
+
 @pytest.fixture(scope="session")
-def ray_evaluator() -> Iterator[RayEvaluator]:
-    opened = RayEvaluator(cpus=2)
-    yield opened
-    opened.close()
+def local_ray() -> Iterator[LocalRay]:
+    local = LocalRay()
+    yield local
+    local.close()
+
+
+@pytest.fixture
+def ray_evaluator(local_ray: LocalRay) -> RayEvaluator:
+    return local_ray.opened()
 
 
 @pytest.fixture(scope="session")

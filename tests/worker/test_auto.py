@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -14,8 +16,9 @@ from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidReq
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
 from gaitswarm.services.runtime import AutoEvaluator, open_evaluator
 from gaitswarm.services.worker.dispatch import InProcessEvaluator
-from gaitswarm.services.worker.ray_evaluator import RayEvaluator, RaySession
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator, RaySession, open_ray
 from tests.examples.processes import eventually
+from tests.worker.conftest import LocalRay
 from tests.worker.requests import bits, never, request, walked_at_once
 
 
@@ -64,6 +67,41 @@ def test_threads_simulate_while_ray_is_started_and_when_it_cannot_be(
     assert caplog.messages == [
         "Ray cannot be started on this machine: no memory; simulations continue in threads"
     ]
+
+
+@pytest.mark.slow
+def test_ray_takes_over_from_threads_to_the_same_bits(
+    local_ray: LocalRay,
+    in_process_evaluator: InProcessEvaluator,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """And says nothing, and this process's handlers of signals are still its own."""
+    may_open, heard = threading.Event(), threading.Event()
+
+    def open_late(address: str | None, *, cpus: int | None) -> RaySession:
+        may_open.wait()
+        return open_ray(address, cpus=cpus)
+
+    monkeypatch.setattr("gaitswarm.services.worker.ray_evaluator.open_ray", open_late)
+    wanted = request(5)
+    expected = bits(walked_at_once(wanted))
+    local_ray.close()
+    auto = AutoEvaluator(in_process_evaluator, local_ray.opened())
+    before = signal.signal(signal.SIGTERM, lambda *_: heard.set())
+    try:
+        assert bits(auto.evaluate(wanted, never)) == expected
+        assert not auto.on_ray
+        may_open.set()
+        eventually(lambda: auto.on_ray)
+        assert bits(auto.evaluate(wanted, never)) == expected
+        assert auto.place.startswith("ray: 2 workers")
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert heard.wait(5.0)
+    finally:
+        may_open.set()
+        signal.signal(signal.SIGTERM, before)
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.slow

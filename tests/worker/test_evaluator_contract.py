@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
-from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    EvaluationStopped,
+    Evaluator,
+)
 from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Walk
@@ -21,6 +25,7 @@ from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.robot import RobotVariant
 from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import short_walk
+from tests.worker.cases import Slow
 from tests.worker.requests import SCENARIOS, bits, never, request, walked_at_once
 
 pytestmark = pytest.mark.slow
@@ -77,13 +82,19 @@ def test_walks_of_another_provenance_are_refused_in_words(evaluator: Evaluator) 
     assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
 
 
+def slow(count: int, seconds: float, job_id: str = "job") -> EvaluationRequest:
+    """A task for each design, that takes so long."""
+    wanted = request(count, job_id=job_id)
+    walk = wanted.cases[0]
+    assert isinstance(walk, Walk)
+    return replace(wanted, cases=(Slow(walk, seconds),))
+
+
 def test_work_is_dropped_when_it_is_stopped(evaluator: Evaluator) -> None:
-    long = short_walk(cycle_time=2.0, cycles=5)
-    stop = threading.Event()
-    threading.Timer(0.3, stop.set).start()
+    asked = itertools.count()
     begun = time.monotonic()
     with pytest.raises(EvaluationStopped):
-        evaluator.evaluate(request(8000, scenarios=(long,)), stop.is_set)
+        evaluator.evaluate(slow(200, 0.3), lambda: next(asked) > 1)
     assert time.monotonic() - begun < 10.0
 
 
@@ -92,9 +103,8 @@ def test_whether_to_stop_is_asked_at_least_once_a_second(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In one of some tries: what else the machine does can only make a pause longer."""
-    # A kernel that takes more than a second, and then walks for as long.
+    # A kernel that takes more than a second, and then a task that takes as long.
     monkeypatch.setattr(simulate, "prepare", lambda _, precision: time.sleep(1.1))
-    long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
 
     def longest_pause() -> float:
         asked = [time.monotonic()]
@@ -104,9 +114,9 @@ def test_whether_to_stop_is_asked_at_least_once_a_second(
             return asked[-1] - asked[0] > 2.2
 
         with pytest.raises(EvaluationStopped):
-            evaluator.evaluate(request(8000, scenarios=(long,)), stop_after_two_seconds)
+            evaluator.evaluate(slow(2, 1.2), stop_after_two_seconds)
         asked.append(time.monotonic())
-        return max(later - earlier for earlier, later in pairwise(asked))
+        return max(later - earlier for earlier, later in itertools.pairwise(asked))
 
     assert any(longest_pause() < 1.0 for _ in range(3))
 
@@ -116,11 +126,11 @@ def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_no
 ) -> None:
     building, may_end = threading.Event(), threading.Event()
     other = request(5)
-    slow = RobotVariant(name="szabadka2", contact_law="stick")
-    cases = tuple(Walk(slow, "pi", scenario, ("P", "I")) for scenario in SCENARIOS)
+    variant = RobotVariant(name="szabadka2", contact_law="stick")
+    cases = tuple(Walk(variant, "pi", scenario, ("P", "I")) for scenario in SCENARIOS)
 
     def build(robot: object, *, precision: Precision) -> None:
-        if robot == slow:
+        if robot == variant:
             building.set()
             may_end.wait()
 
@@ -163,21 +173,22 @@ def test_jobs_at_the_same_time_do_not_disturb_each_others_bits(evaluator: Evalua
 
 
 def test_a_small_job_is_served_while_a_big_one_runs(evaluator: Evaluator) -> None:
-    big_ended = threading.Event()
-    stop = threading.Event()
-    # A minute and more of work, in pieces of a second.
-    long = short_walk(cycle_time=2.0, cycles=5)
+    begun, stop, big_ended = threading.Event(), threading.Event(), threading.Event()
+
+    def should_stop() -> bool:
+        begun.set()
+        return stop.is_set()
 
     def run_big() -> None:
         try:
-            evaluator.evaluate(request(8000, job_id="big", scenarios=(long,)), stop.is_set)
+            evaluator.evaluate(slow(200, 0.3, job_id="big"), should_stop)
         except EvaluationStopped:
             return
         big_ended.set()
 
     thread = threading.Thread(target=run_big)
     thread.start()
-    time.sleep(0.2)
+    begun.wait()
     evaluator.evaluate(request(8, job_id="small"), never)
     assert not big_ended.is_set()
     stop.set()

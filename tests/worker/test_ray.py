@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,7 +18,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, KilledWorker
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
@@ -34,48 +33,56 @@ from tests.examples.jobs import SMALL_SPEC
 from tests.examples.paths import ROOT
 from tests.examples.processes import eventually, output, within
 from tests.worker.cases import Deadly, Sleep
-from tests.worker.processes import descendants, walkers
+from tests.worker.conftest import LocalRay
+from tests.worker.processes import Process, descendants, walkers
 from tests.worker.requests import bits, never, request, walked_at_once
 
 
 @pytest.mark.slow
 def test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits(
     ray_evaluator: RayEvaluator,
-) -> None:
-    wanted = request(300)
-    expected = bits(walked_at_once(wanted))
-    killed: list[int] = []
-
-    def kill_one_at_work() -> None:
-        while not killed:
-            for worker in walkers(os.getpid()):
-                if "simulate" in worker.title:
-                    os.kill(worker.pid, signal.SIGKILL)
-                    killed.append(worker.pid)
-                    return
-
-    killer = threading.Thread(target=kill_one_at_work)
-    killer.start()
-    found = ray_evaluator.evaluate(wanted, never)
-    killer.join()
-    assert len(killed) == 1
-    assert bits(found) == expected
-
-
-@pytest.mark.slow
-def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continues(
-    ray_evaluator: RayEvaluator,
-    store: Store,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """What Ray prints of it is logged, and not written among the answers of a command."""
     caplog.set_level(logging.INFO, logger="gaitswarm.services.worker.ray_evaluator")
+    wanted = request(4)
+    first, second = wanted.cases
+    assert isinstance(first, Walk)
+    deadly = replace(wanted, cases=(Deadly(first, tmp_path / "deaths", times=1), second))
+    assert bits(ray_evaluator.evaluate(deadly, never)) == bits(walked_at_once(wanted))
+    assert len((tmp_path / "deaths").read_text().split()) == 1
+    assert within(20.0, lambda: "raylet: A worker died" in caplog.text)
+    assert capfd.readouterr().out == ""
+
+
+@pytest.mark.slow
+def test_walks_that_crash_worker_after_worker_are_named(
+    ray_evaluator: RayEvaluator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import ray
+
+    gone = Mock(side_effect=ray.exceptions.WorkerCrashedError)
+    ray_evaluator.wait_until_open(never)
+    with monkeypatch.context() as patched:
+        patched.setattr(ray, "get", gone)
+        with pytest.raises(KilledWorker, match="3 worker processes died"):
+            ray_evaluator.evaluate(request(1), never)
+
+
+@pytest.mark.thorough(
+    "test_walks_that_crash_worker_after_worker_are_named",
+    "test_walks_that_kill_worker_after_worker_fail_their_job_with_the_reason",
+)
+@pytest.mark.slow
+def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continues(
+    ray_evaluator: RayEvaluator, store: Store, tmp_path: Path
+) -> None:
     wanted = request(1)
     walk = wanted.cases[0]
     assert isinstance(walk, Walk)
-    wanted = replace(wanted, cases=(Deadly(walk, tmp_path / "deaths"),), designs=-wanted.designs)
+    wanted = replace(wanted, cases=(Deadly(walk, tmp_path / "deaths", times=9),))
 
     class Crashing:
         """The evaluator of a runner, with another request for the first job."""
@@ -106,8 +113,6 @@ def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continu
     assert store.job(second.id).state is JobState.SUCCEEDED
     died = (tmp_path / "deaths").read_text().split()
     assert len(died) == len(set(died)) == 3
-    assert within(20.0, lambda: "raylet: A worker died" in caplog.text)
-    assert capfd.readouterr().out == ""
 
 
 @pytest.mark.thorough("test_work_is_dropped_when_it_is_stopped")
@@ -146,9 +151,9 @@ def test_cases_of_all_iterations_of_a_job_are_sent_once(
 def test_a_worker_takes_at_most_500_megabytes_and_has_loaded_only_what_walks_need(
     ray_evaluator: RayEvaluator,
 ) -> None:
-    ray_evaluator.evaluate(request(200), never)
+    ray_evaluator.evaluate(request(20), never)
     at_work = walkers(os.getpid())
-    assert len(at_work) >= 2
+    assert at_work
     assert max(worker.resident for worker in at_work) <= 500e6
     for library in ("casadi", "pinocchio", "sqlalchemy"):
         assert not any(worker.has_loaded(library) for worker in at_work)
@@ -162,15 +167,15 @@ def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator
 
 
 @contextmanager
-def driver(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
-    """A process of its own that simulates in threads, on Ray, and perhaps loses it."""
+def driver(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A process of its own that simulates in threads, on Ray, and loses it."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(folder)}
     # Kernels are those of this home, not compiled again.
     environment.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache"))
     for name in [name for name in environment if name.startswith("RAY_")]:
         del environment[name]
     with subprocess.Popen(
-        [sys.executable, "-m", "tests.worker.driver", *options],
+        [sys.executable, "-m", "tests.worker.driver"],
         cwd=ROOT,
         env=environment,
         stdin=subprocess.PIPE,
@@ -186,43 +191,40 @@ def driver(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
                 os.killpg(started.pid, signal.SIGKILL)
 
 
-def steps_of(started: subprocess.Popen[str], count: int) -> list[str]:
-    return [output(started.stdout).readline().strip() for _ in range(count)]
-
-
-@pytest.mark.slow
-def test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing(tmp_path: Path) -> None:
-    with driver(tmp_path) as started:
-        assert steps_of(started, 2) == ["threads", "ray"]
-        below = descendants(started.pid)
-        # Ray's own default; workers of other tests run at a higher priority.
-        niceness = {os.getpriority(os.PRIO_PROCESS, p.pid) for p in walkers(started.pid)}
-        assert min(niceness) > 4
-        assert traces(started.pid)
-        # Its handlers of signals are still its own.
-        assert started.communicate("now\n", timeout=60) == ("heard\n", "")
-        assert started.returncode == 0
-        assert within(10.0, lambda: not any(p.alive for p in below))
-        assert not traces(started.pid)
-        assert not (tmp_path / ".ray").exists()
-
-
-@pytest.mark.thorough(
-    "test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing",
-)
+@pytest.mark.thorough("test_ray_takes_over_from_threads_to_the_same_bits")
 @pytest.mark.slow
 def test_a_local_ray_whose_raylet_dies_is_opened_again_and_ends_with_its_process(
     tmp_path: Path,
 ) -> None:
-    with driver(tmp_path, "lose") as started:
-        assert steps_of(started, 4) == ["threads", "ray", "threads", "ray"]
-        titles = ("gcs_server", "raylet/raylet", "ray::")
-        vital = [p for p in descendants(started.pid) if any(t in p.title for t in titles)]
+    with driver(tmp_path) as started:
+        steps = [output(started.stdout).readline().strip() for _ in range(4)]
+        assert steps == ["threads", "ray", "threads", "ray"]
+        # Ray's own default; workers of other tests run at a higher priority.
+        niceness = {os.getpriority(os.PRIO_PROCESS, p.pid) for p in walkers(started.pid)}
+        assert min(niceness) > 4
+        vital = processes_of_ray(started.pid)
         assert len(vital) >= 3
         os.kill(started.pid, signal.SIGKILL)
         assert within(5.0, lambda: not any(p.alive for p in vital))
+        assert not (tmp_path / ".ray").exists()
         for directory in traces(started.pid):
             shutil.rmtree(directory, ignore_errors=True)
+
+
+@pytest.mark.slow
+def test_a_closed_ray_leaves_nothing(local_ray: LocalRay) -> None:
+    local_ray.opened().wait_until_open(never)
+    below = processes_of_ray(os.getpid())
+    assert len(below) >= 3
+    assert traces(os.getpid())
+    local_ray.close()
+    assert within(10.0, lambda: not any(p.alive for p in below))
+    assert not traces(os.getpid())
+
+
+def processes_of_ray(pid: int) -> list[Process]:
+    titles = ("gcs_server", "raylet/raylet", "ray::")
+    return [p for p in descendants(pid) if any(title in p.title for title in titles)]
 
 
 def traces(pid: int) -> list[Path]:

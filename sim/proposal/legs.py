@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import filter as matching
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import Final, Literal, get_args
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
@@ -421,7 +422,7 @@ def find_legs(urdf: Urdf, *, upright: bool = False, hints: LegHints = NO_HINTS) 
         raise RobotFileError(_why_none(urdf, chains))
     found = [_leg_of(urdf, chain, hints) for chain in threes]
     kinematics = [chain_leg(urdf, leg.joints, leg.end.at) for leg in found]
-    reached = [(leg, leg.ends(tried_angles(leg))) for leg in kinematics]
+    reached = [(leg, tried(leg)[1]) for leg in kinematics]
     drops = [leg.hip[2] - float(feet[:, 2].min()) for leg, feet in reached]
     if not upright:
         hips = np.array([leg.hip for leg, _ in reached])
@@ -480,15 +481,32 @@ def reach_below(robot: Robot, number: int) -> float:
     """Return how far a leg's foot gets below the highest hip within the joints' limits [m]."""
     leg = robot.description.legs[number]
     kinematics = _kinematics(leg.name, (chain := chain_of(robot.urdf, leg)), chain.foot)
-    feet = kinematics.ends(tried_angles(kinematics))
+    _, feet = tried(kinematics)
     return max(leg.hip[2] for leg in robot.legs) - float(feet[:, 2].min())
 
 
-def tried_angles(leg: ChainLeg) -> Floats:
-    """Return a grid of a leg's angles within their limits and one turn, (n, 3) [rad]."""
-    ends = np.clip(leg.limits, -np.pi, np.pi)
+def tried(leg: ChainLeg) -> tuple[Floats, Floats]:
+    """Return a grid of a leg's angles within their limits and one turn, and its feet, (n, 3)."""
+    numbers = (leg.rotations, leg.offsets, leg.axes, leg.end, leg.limits)
+    return _tried(_Tried(b"".join(part.tobytes() for part in numbers), leg))
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """Legs of equal numbers are equal: one is found several times, for stances of each height."""
+
+    numbers: bytes
+    leg: ChainLeg = field(compare=False)
+
+
+@lru_cache(maxsize=16)
+def _tried(of: _Tried) -> tuple[Floats, Floats]:
+    ends = np.clip(of.leg.limits, -np.pi, np.pi)
     axes = [np.linspace(lower, upper, _STEPS) for lower, upper in ends]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, JOINTS_PER_LEG)
+    angles = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, JOINTS_PER_LEG)
+    feet = of.leg.ends(angles)
+    angles.flags.writeable = feet.flags.writeable = False
+    return angles, feet
 
 
 def _chains(urdf: Urdf) -> Iterable[tuple[Joint, ...]]:

@@ -17,7 +17,7 @@ from gaitswarm.sim.gait.inverse_kinematics import chain_angles
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.input import message_of
 from gaitswarm.sim.kernel.parameters import GRAVITY
-from gaitswarm.sim.proposal.legs import tried_angles
+from gaitswarm.sim.proposal.legs import tried
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import Scenario
@@ -61,12 +61,12 @@ def choose_stance(legs: Sequence[ChainLeg], height: float = HEIGHTS[0]) -> Stanc
     long axis, unless that would twist legs as they are mounted: those of a round robot point
     outwards.
     """
-    tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
+    grids = [tried(leg) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)
-    ground = hips - height * (hips - max(float(feet[:, 2].min()) for _, feet in tried))
+    ground = hips - height * (hips - max(float(feet[:, 2].min()) for _, feet in grids))
     middle = np.mean([leg.hip for leg in legs], axis=0)
     chosen = [
-        _best(leg, *of, ground, hips - ground, middle) for leg, of in zip(legs, tried, strict=True)
+        _best(leg, *of, ground, hips - ground, middle) for leg, of in zip(legs, grids, strict=True)
     ]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))

@@ -22,6 +22,7 @@ def made_with(actuators: dict[str, str]) -> Robot:
     return parse_robot(made.toml, made.urdf)
 
 
+@pytest.mark.variants("mx64", "erob80-50")
 @pytest.mark.parametrize("name", listed_actuators())
 def test_a_robot_made_with_a_listed_actuator_has_its_numbers(name: str) -> None:
     listed, robot = listed_actuators()[name], made_with({"*": name})

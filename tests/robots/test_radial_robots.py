@@ -13,7 +13,9 @@ from gaitswarm.robots import check_robot
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal import document
 from gaitswarm.sim.proposal.document import Proposal, walking_proposal
+from gaitswarm.sim.proposal.stance import HEIGHTS
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.robot import Robot, parse_robot
@@ -41,7 +43,7 @@ def made(layout: str, limit: float = 0.8) -> tuple[Proposal, Robot]:
     return proposal, parse_robot(proposal.toml, proposal.urdf)
 
 
-@pytest.mark.variants("four-0.8", "five-1.57")
+@pytest.mark.variants("three-0.8", "six-0.8", "five-1.57")
 @pytest.mark.parametrize("limit", [0.8, 1.57])
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_leg_stands_where_it_points_and_both_walks_are_in_reach(
@@ -60,11 +62,12 @@ def test_every_leg_stands_where_it_points_and_both_walks_are_in_reach(
         require_reachable(robot, Scenario.model_validate(walk))
 
 
-def test_neighbours_of_a_round_hexapod_step_in_turns() -> None:
-    for layout in ("six", "six, ahead"):
-        _, robot = made(layout)
-        phases = [leg.phase for leg in robot.description.legs]
-        assert phases in ([0.0, 0.5] * 3, [0.5, 0.0] * 3)
+@pytest.mark.variants
+@pytest.mark.parametrize("layout", ["six", "six, ahead"])
+def test_neighbours_of_a_round_hexapod_step_in_turns(layout: str) -> None:
+    _, robot = made(layout)
+    phases = [leg.phase for leg in robot.description.legs]
+    assert phases in ([0.0, 0.5] * 3, [0.5, 0.0] * 3)
 
 
 @pytest.mark.variants
@@ -106,29 +109,30 @@ def test_steps_are_as_long_as_narrow_joints_allow_and_that_is_reported() -> None
         assert "of the usual stride and lift, as legs reach no further" in note
 
 
-def test_legs_without_room_for_steps_are_refused_by_joint() -> None:
+def test_legs_without_room_for_steps_are_refused_by_joint(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(document, "HEIGHTS", HEIGHTS[:1])
     said = (
         r"robot\.urdf, line (\d+): joint ('leg\d_coxa'): legs cannot step around their stance,"
         r" .*: joint '\w+' of leg 'leg\d' would turn 0\.\d+ rad beyond its limit; check this"
     )
     with pytest.raises(RobotFileError, match=said) as refused:
-        made("six", limit=0.01)
+        made("three", limit=0.01)
     found = re.search(said, str(refused.value))
     assert found and f"joint name={found[2]}".replace("'", '"') in _line(found[1])
-    raised = radial_robot(6).replace('xyz="0.12 0.0 0"', 'xyz="0.12 0.0 0.4"', 1)
+    raised = radial_robot(3).replace('xyz="0.12 0.0 0"', 'xyz="0.12 0.0 0.4"', 1)
     level = r"joint 'leg\d_coxa' begins a leg whose foot cannot be level with the others"
     with pytest.raises(RobotFileError, match=rf"line \d+: {level}"):
         walking_proposal(raised, "round")
 
 
 def _line(number: str) -> str:
-    return radial_robot(*LAYOUTS["six"], 0.01).splitlines()[int(number) - 1]
+    return radial_robot(*LAYOUTS["three"], 0.01).splitlines()[int(number) - 1]
 
 
 def test_legs_are_named_by_what_their_joints_share() -> None:
     _, robot = made("six")
     assert [leg.name for leg in robot.legs] == [f"leg{k}" for k in range(6)]
-    text = radial_robot(6).replace("_coxa", "_j1").replace("_femur", "_j2").replace("_tibia", "_j3")
+    text = radial_robot(3).replace("_coxa", "_j1").replace("_femur", "_j2").replace("_tibia", "_j3")
     proposal = walking_proposal(text, "round")
     robot = parse_robot(proposal.toml, proposal.urdf)
-    assert [leg.name for leg in robot.legs] == [f"leg{k}" for k in range(6)]
+    assert [leg.name for leg in robot.legs] == [f"leg{k}" for k in range(3)]

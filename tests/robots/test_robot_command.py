@@ -88,7 +88,7 @@ def test_check_prints_masses_by_group_of_links_and_guesses_of_init(
 
 
 def test_guesses_of_shorter_walks_are_in_the_folder_too() -> None:
-    proposal = walking_proposal(radial_robot(6, limit=0.15), "round")
+    proposal = walking_proposal(radial_robot(3, limit=0.15), "round")
     guessed = parse_robot(proposal.toml, proposal.urdf).description.guesses
     assert guessed == proposal.guesses
     assert sum("reach no further" in guess for guess in guessed) == 2

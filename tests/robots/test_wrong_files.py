@@ -44,6 +44,7 @@ def test_init_names_file_line_and_remedy(
     assert [path.name for path in tmp_path.iterdir()] == ["mine.urdf"]
 
 
+@pytest.mark.variants("no mass", "unknown joint", "no character")
 @pytest.mark.parametrize("wrong", ALL, ids=lambda wrong: wrong.name)
 def test_check_names_file_line_and_remedy(
     wrong: Wrong, tmp_path: Path, capsys: pytest.CaptureFixture[str]

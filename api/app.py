@@ -46,7 +46,7 @@ def create_app(
 ) -> FastAPI:
     """Create the application. The caller keeps ownership of the service's store."""
     metrics = metrics or Metrics()
-    metrics.registry.register(QueueCollector(lambda: service.store))
+    metrics.registry.register(QueueCollector(lambda: app.state.service.store))
     # The scripts of /docs are part of the package, so that it works offline.
     app = FastAPIOffline(
         docs_url=None,
@@ -86,7 +86,7 @@ def create_app(
     )
     app.add_middleware(
         AccessMiddleware,
-        tokens=lambda: service.store.tokens,
+        tokens=lambda: app.state.service.store.tokens,
         guesses=guesses,
         required=settings.tokens_required,
     )

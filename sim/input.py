@@ -224,9 +224,17 @@ def message_of(error: Mapping[str, Any]) -> str:
 def with_known_keys(
     errors: Sequence[Mapping[str, Any]], model: Any
 ) -> tuple[Mapping[str, Any], ...]:
+    # An object may have thousands of unknown keys.
+    @cache
+    def context(container: tuple[str | int, ...]) -> dict[str, Any] | None:
+        known = {
+            name: kind for node in _models_at(model, container) for name, kind in _fields(node)
+        }
+        return {"known": [*known], "inner": _inner_keys(known)} if known else None
+
     return tuple(
-        {**error, "ctx": {"known": [*known], "inner": _inner_keys(known)}}
-        if error["type"] == "extra_forbidden" and (known := _known_keys(model, error["loc"]))
+        {**error, "ctx": keys}
+        if error["type"] == "extra_forbidden" and (keys := context(error["loc"][:-1]))
         else error
         for error in errors
     )
@@ -239,18 +247,13 @@ def _number(value: object) -> object:
 def description_of(model: Any, location: Sequence[str | int]) -> str | None:
     """Return the description of the field at a location in a model's document, if it has one."""
     name = str(location[-1]) if location else ""
-    models = (node for node in _containing(model, location) if issubclass(node, Described))
+    models = (node for node in _models_at(model, location[:-1]) if issubclass(node, Described))
     return next((m.descriptions().get(name) for m in models if name in m.model_fields), None)
 
 
-def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:
-    """Fields, with annotations, of the models that contain the last part of a location."""
-    return {name: kind for node in _containing(model, location) for name, kind in _fields(node)}
-
-
-def _containing(model: Any, location: Sequence[str | int]) -> list[type[BaseModel]]:
+def _models_at(model: Any, location: Sequence[str | int]) -> list[type[BaseModel]]:
     reached = [model]
-    for part in location[:-1]:
+    for part in location:
         reached = [inner for one in reached for inner in _inner(one, part)]
     return [one for node in reached for _, one in _alternatives(node) if _is_model(one)]
 

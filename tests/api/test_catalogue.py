@@ -15,6 +15,7 @@ from gaitswarm.sim.catalogue import GAIT_VARIABLES
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
 from gaitswarm.sim.scenario import PRESETS, SCENARIOS
+from tests.examples.api_document import api_document
 
 
 def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:
@@ -47,8 +48,9 @@ def test_a_job_walks_in_the_scenarios_of_the_table_unless_it_names_others(
     job = client.post("/v1/jobs", json={"controller": "pi"}).json()
     assert job["scenarios"] == [scenario.name for scenario in SCENARIOS]
 
-    document = client.get("/openapi.json").json()
-    default = document["components"]["schemas"]["JobSpec"]["properties"]["scenarios"]["default"]
+    default = api_document()["components"]["schemas"]["JobSpec"]["properties"]["scenarios"][
+        "default"
+    ]
     assert default == job["scenarios"], "the page begins with it"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
 from typing import Any, cast
 
@@ -16,7 +16,7 @@ from schemathesis.core.parameters import ParameterLocation
 from schemathesis.core.result import Ok
 from schemathesis.generation.meta import CoveragePhaseData
 from schemathesis.pytest.lazy import get_all_tests
-from schemathesis.schemas import APIOperation, BaseSchema
+from schemathesis.schemas import BaseSchema
 
 from gaitswarm.api.app import create_app
 from gaitswarm.services.optimizer.service import JobService
@@ -26,13 +26,22 @@ from tests.api.conformance import CHECKS, campaign, config
 from tests.examples.api_document import api_document
 from tests.examples.servers import Server
 
+_NAMED = {
+    "SimulationRequest": ("scenarios",),
+    "RobustnessRequest": ("robot", "scenarios"),
+    "ReplayRequest": ("robot", "scenario"),
+    "MeasuredWalkRequest": ("robot",),
+}
+"""Fields of bodies whose models are also part of another body."""
+
 
 @cache
 def _document() -> dict[str, Any]:
-    """The server's own, but for most kinds of specs, of which there are the document's examples.
+    """The server's own, but with examples in place of most specs, and names in place of models.
 
     Making all cases of specs takes minutes. All kinds are read alike: cases are made of those that
-    tune a drive where jobs are submitted, and of all by `python -m tests.api.conformance`.
+    tune a drive where jobs are submitted, and of all by `python -m tests.api.conformance`. Of
+    robots and scenarios, cases are made in one body each; others name them.
     """
     document = api_document()
     models = document["components"]["schemas"]
@@ -42,6 +51,11 @@ def _document() -> dict[str, Any]:
         examples = [example for name in kinds for example in models[name]["examples"]]
         whole = [kind for name, kind in kinds.items() if name == made]
         content["schema"] = {"anyOf": [*whole, {"enum": examples}]}
+    for model, fields in _NAMED.items():
+        for field in fields:
+            schema = models[model]["properties"][field]
+            either = schema.get("items", schema)
+            either["oneOf"] = [kind for kind in either["oneOf"] if "$ref" not in kind]
     return document
 
 
@@ -62,80 +76,47 @@ _OPERATIONS = [
 ]
 
 _SETTINGS = settings(
-    max_examples=2,
-    derandomize=True,
     deadline=None,
     database=None,
-    phases=[Phase.explicit, Phase.generate],
+    phases=[Phase.explicit],
     suppress_health_check=list(HealthCheck),
 )
 
-_NAMES = re.compile(r"Object with valid '(\w+)' value: ")
+_NAMES = re.compile(r"(?:^|-> )(\w+)(?= ->|:)|'(\w+)' value: ")
+"""Properties in the description of a case, from the outermost to the innermost."""
+
 _seen: set[object] = set()
 
 
 def filter_case(_: schemathesis.HookContext, case: schemathesis.Case[Any]) -> bool:
-    """Whether a case has something in it that none of its operation had before.
+    """Whether a case has something in it that none had before.
 
-    Every property of a body is set to values of every kind, good and bad. A model that is part of
-    several, as an optimizer's settings are of every kind of job, is covered within one of them:
-    within all of them a job would be submitted in ten thousand ways. What breaks a model is refused
-    before the operation begins: it is sent to the first operation only that takes that model.
+    Every operation is sent each kind of wrong value in its path, its query and its body, and every
+    property of every model a wrong and a right value. Each with each, and values by chance, are
+    sent by `python -m tests.api.conformance`.
     """
     if "x-schemathesis-unknown-property" in case.headers:
         # Any request may have further headers.
         return False
-    coverage = case.meta.phase.data if case.meta else None
+    assert case.meta is not None
+    coverage = case.meta.phase.data
     if not isinstance(coverage, CoveragePhaseData):
         return True
-    if coverage.parameter_location is not ParameterLocation.BODY:
-        return True
-    if coverage.location is not None:
-        model, *within = _within_model(case.operation, coverage.location)
-        key: tuple[object, ...] = (model or case.operation.label, *within)
+    label, mode = case.operation.label, case.meta.generation.mode
+    where = coverage.parameter_location
+    if mode.is_positive:
+        tried: set[object] = {(label, where, "good"), (where, coverage.scenario)}
     else:
-        *before, value = _NAMES.split(coverage.description)
-        names = before[1::2]
+        tried = {(label, where, coverage.scenario)}
+    names = [outer or inner for outer, inner in _NAMES.findall(coverage.description)]
+    if where is ParameterLocation.BODY and names:
         # What is within a property is part of a model that other operations take, too.
-        where = case.operation.label if len(names) < 2 else names[0]
-        key = (where, *names[-1:], value, _properties_beside(case.body, names))
-    new = (coverage.scenario, key) not in _seen
-    _seen.add((coverage.scenario, key))
+        tried.add((mode, *(names[-2:] if len(names) > 1 else (label, *names))))
+    elif where is ParameterLocation.QUERY:
+        tried.add((mode, label, coverage.parameter))
+    new = not tried <= _seen
+    _seen.update(tried)
     return new
-
-
-def _within_model(operation: APIOperation[Any, Any, Any, Any], location: str) -> tuple[str, ...]:
-    """A place in a body's schema: the innermost model that it is in, and the way on from there.
-
-    The model's name is "" where the place is in none.
-    """
-    body = _document()["paths"][operation.path][operation.method]["requestBody"]["content"]
-    node: Any = body["application/json"]["schema"]
-    place: tuple[str, ...] = ("",)
-    for step in location.split("/")[1:]:
-        while isinstance(node, dict) and "$ref" in node:
-            name = node["$ref"].rpartition("/")[2]
-            node, place = _document()["components"]["schemas"][name], (name,)
-        place = (*place, step)
-        if isinstance(node, list):
-            node = node[int(step)] if step.isdigit() else None
-        else:
-            node = node.get(step) if isinstance(node, dict) else None
-    return place
-
-
-def _properties_beside(body: Any, names: Sequence[str]) -> tuple[str, ...]:
-    """Names of all properties of the object that the last of nested properties belongs to."""
-    for name in names[:-1]:
-        body = _first(body).get(name)
-    return tuple(sorted(_first(body)))
-
-
-def _first(value: Any) -> dict[str, Any]:
-    """An object itself, or the first one of an array."""
-    while isinstance(value, list) and value:
-        value = value[0]
-    return value if isinstance(value, dict) else {}
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ import httpx2
 import pytest
 
 from gaitswarm.api.documentation import TAGS
-from tests.examples.servers import Server
+from tests.examples.api_document import api_document
 
 Document = dict[str, Any]
 Operation = tuple[str, Document]
 
 
 @pytest.fixture(scope="module")
-def document(lasting_server: Server) -> Document:
-    return lasting_server.client.get("/openapi.json").json()
+def document() -> Document:
+    return api_document()
 
 
 def operations(document: Document) -> Iterator[Operation]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from typing import Any, Final
 
@@ -35,6 +36,7 @@ class Body:
     field: str | None = None
 
 
+@cache
 def corpus() -> tuple[Body, ...]:
     """The whole corpus, the same every time."""
     bodies = [*_toml(), *_urdf_sizes(), *_urdf_numbers(), *_urdf_trees(), *_specs(), *_raw()]

@@ -56,6 +56,10 @@ class PostgresServer:
     def url(self) -> str:
         return f"postgresql://gaitswarm@127.0.0.1:{self.port}"
 
+    @property
+    def runs(self) -> bool:
+        return (self.folder / "data" / "postmaster.pid").exists()
+
     def start(self) -> None:
         """Start it, and wait until it answers."""
         fsync = "on" if self.durable else "off"

@@ -20,7 +20,7 @@ from tests.store.examples import LEASE, spec
 # The fixture's database is shared by the examples on purpose: each makes a job of its own.
 many = settings(
     deadline=None,
-    max_examples=12,
+    max_examples=4,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 awkward = st.sampled_from(
@@ -40,7 +40,7 @@ def column(values: list[float], *shape: int) -> NDArray[np.float64]:
 
 @many
 @given(
-    positions=st.lists(finite, min_size=4, max_size=4),
+    positions=st.lists(finite, min_size=40, max_size=40),
     state=st.dictionaries(
         st.text('aé"\\\0', max_size=3), st.one_of(finite, st.integers()), max_size=4
     ),
@@ -48,14 +48,14 @@ def column(values: list[float], *shape: int) -> NDArray[np.float64]:
 def test_an_ask_comes_back_exactly(
     store: Store, positions: list[float], state: dict[str, float]
 ) -> None:
-    job, _ = store.create_job(spec())
+    job, _ = store.create_job(spec(particles=20))
     claim = store.claim("a", lease_seconds=LEASE, job_id=job.id)
     assert claim is not None
-    store.begin(claim, Ask(0, column(positions, 2, 2), dict(state)))
+    store.begin(claim, Ask(0, column(positions, 20, 2), dict(state)))
     store.release(claim, JobState.QUEUED)
     again = store.claim("b", lease_seconds=LEASE, job_id=job.id)
     assert again is not None and again.ask is not None
-    assert again.ask.positions.shape == (2, 2)
+    assert again.ask.positions.shape == (20, 2)
     assert bits(again.ask.positions) == bits(positions)
     assert {k: (type(v), repr(v)) for k, v in again.ask.state.items()} == {
         k: (type(v), repr(v)) for k, v in state.items()

@@ -162,7 +162,12 @@ def execute(database_url: str, statement: str, **values: object) -> None:
     database.close()
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-an objective")
+@pytest.mark.variants(
+    *("*-a number of a design", "sqlite-a status", "sqlite-what was asked", "sqlite-a digest"),
+    *("sqlite-the digest of a state", "sqlite-no digest", "sqlite-an order of designs"),
+    *("sqlite-a design too few", "sqlite-a part of a number", "sqlite-a summary"),
+    *("sqlite-no status", "sqlite-the job's spec", "sqlite-the job's provenance"),
+)
 @pytest.mark.parametrize(("statement", "index"), TAMPERED.values(), ids=TAMPERED)
 def test_what_was_changed_is_found_and_its_iteration_named(
     store: Store, database_url: str, statement: str, index: int

@@ -160,12 +160,12 @@ def test_iterations_are_paged_by_index(store: Store) -> None:
     assert store.iterations(job_id, after=4).items == ()
 
 
-@pytest.mark.parametrize("index", [-(2**70), -1, 1, 2**31, 2**70])
-def test_an_index_beyond_any_iteration_finds_nothing(store: Store, index: int) -> None:
+def test_an_index_beyond_any_iteration_finds_nothing(store: Store) -> None:
     job_id = run(store, (1.0, 2.0)).job.id
-    with pytest.raises(NotFound):
-        store.evaluations(job_id, index)
-    assert len(store.iterations(job_id, after=index).items) == (1 if index < 0 else 0)
+    for index in (-(2**70), -1, 1, 2**31, 2**70):
+        with pytest.raises(NotFound):
+            store.evaluations(job_id, index)
+        assert len(store.iterations(job_id, after=index).items) == (1 if index < 0 else 0)
 
 
 def test_a_page_of_no_iterations_is_refused(store: Store) -> None:

@@ -67,7 +67,10 @@ def test_a_refusal_says_what_is_possible_instead() -> None:
         commanded(JobState.SUCCEEDED, Command.RESUME)
 
 
-@pytest.mark.variants("sqlite-*", "postgresql-running-*")
+@pytest.mark.variants(
+    *("sqlite-running-*", "sqlite-queued-pause", "sqlite-paused-resume", "sqlite-failed-resume"),
+    *("sqlite-pausing-resume", "sqlite-succeeded-pause"),
+)
 @pytest.mark.parametrize(("state", "command"), EVERY_PAIR)
 def test_the_store_applies_a_command_or_changes_nothing(
     store: Store, state: JobState, command: Command

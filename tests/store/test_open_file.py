@@ -147,10 +147,11 @@ def test_a_log_that_is_made_again_between_connections_is_no_replacement(database
     with closing(Database(str(database))) as engine:
         write(engine)
         before = log.stat().st_ino
+        # A file that has its inode, so that no other one gets it.
+        log.with_name("another").hardlink_to(log)
         # As when a user interrupts a statement: its connection, the only one, is closed.
         engine.close()
         assert not log.exists()
-        log.with_name("another").touch()
         write(engine)
         write(engine)
         assert log.stat().st_ino != before

@@ -33,8 +33,8 @@ pytestmark = pytest.mark.slow
 
 UNSHARE = shutil.which("unshare")
 
-LONG = SPEC.model_copy(update={"iterations": 60})
-"""A second of commits, at least."""
+LONG = SPEC.model_copy(update={"iterations": 40})
+"""Half a second of commits, at least."""
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def run_to_its_end(store: Store, lease_seconds: float, disturb: threading.Event)
     runner = Runner(store, FormulaEvaluator(), lease_seconds=lease_seconds, poll_seconds=0.05)
     runner.start()
     try:
-        eventually(lambda: store.job(job.id).progress.iterations > 20)
+        eventually(lambda: store.job(job.id).progress.iterations > 5)
         disturb.set()
 
         def ended() -> bool:

@@ -124,9 +124,9 @@ LONG_STEPS = SHORT_WALK | {"name": "mine", "stride": 0.5}
     ],
 )
 def test_a_job_that_cannot_be_simulated_is_refused_and_not_stored(
-    tmp_path: Path, asked: dict[str, Any], field: str, message: str
+    database: Path, asked: dict[str, Any], field: str, message: str
 ) -> None:
-    store = open_store(str(tmp_path / "jobs.db"))
+    store = open_store(str(database))
     with pytest.raises(InvalidRequest, match=message) as refused:
         JobService(store).submit(JobSpec.model_validate({"controller": "pi", **asked}))
     assert refused.value.field == field
@@ -134,8 +134,8 @@ def test_a_job_that_cannot_be_simulated_is_refused_and_not_stored(
     store.close()
 
 
-def test_a_scenario_is_fine_if_a_searched_gait_can_stay_within_reach(tmp_path: Path) -> None:
-    store = open_store(str(tmp_path / "jobs.db"))
+def test_a_scenario_is_fine_if_a_searched_gait_can_stay_within_reach(database: Path) -> None:
+    store = open_store(str(database))
     asked = {"controller": "pi", "scenarios": [LONG_STEPS], "variables": ["P", "I", "stride"]}
     job, new = JobService(store).submit(JobSpec.model_validate(asked))
     assert new and JobService(store).job(job.id) == job

@@ -22,8 +22,8 @@ from tests.store.postgres_server import PostgresServer
 
 pytestmark = pytest.mark.slow
 
-ITERATIONS = 30
-STREAMS = 10
+ITERATIONS = 10
+STREAMS = 4
 
 
 def followed(url: str, job_id: str, opened: threading.Semaphore) -> list[int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.walk import WalkSetup, current_smoothing
 from gaitswarm.sim.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +108,10 @@ def walk_log(robot: Robot, setup: WalkSetup, states: Floats) -> WalkLog:
     joints = robot.n_joints
     seen = [np.full((ticks, size), np.nan) for size in (joints, joints, joints, 3 * feet, 1)]
     if walked:
+        # Imported here: with a compiled kernel, only logs need CasADi.
+        from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
+
+        model = physics_model(robot, uneven=setup.terrain is not None)
         disturbance = np.zeros_like(angle) if setup.disturbance is None else setup.disturbance
         q = np.concatenate([position, orientation, angle], axis=1)
         inputs = (q, np.concatenate([twist, rate], axis=1), internal_state, duty, disturbance)
@@ -114,11 +121,11 @@ def walk_log(robot: Robot, setup: WalkSetup, states: Floats) -> WalkLog:
         parameters[:begin, pushes] = parameters[end:, pushes] = 0.0
         arguments = [part[:walked].T for part in (*inputs, parameters)]
         if setup.terrain is not None:
-            places = np.array(_mapped(robot, "places", walked, uneven=True)(arguments[0])).T
+            places = np.array(_mapped(model, "places", walked)(arguments[0])).T
             x, y, *_ = places.reshape(-1, 6).T
             arguments.append(np.stack(setup.terrain.under(x, y), axis=1).reshape(walked, -1).T)
-        observe = _mapped(robot, "observe", walked, uneven=setup.terrain is not None)
-        for target, part in zip(seen, observe(*arguments), strict=False):
+        observed = _mapped(model, "observe", walked)(*arguments)
+        for target, part in zip(seen, observed, strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen
     return WalkLog(
@@ -139,11 +146,8 @@ def walk_log(robot: Robot, setup: WalkSetup, states: Floats) -> WalkLog:
 
 
 @lru_cache(maxsize=32)
-def _mapped(robot: Robot, function: str, instants: int, *, uneven: bool) -> Any:
-    # Imported here: with a compiled kernel, only logs need CasADi.
-    from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
-
-    return getattr(physics_model(robot, uneven=uneven), function).map(instants)
+def _mapped(model: PhysicsModel, function: str, instants: int) -> Any:
+    return getattr(model, function).map(instants)
 
 
 def sensed_currents(robot: Robot, current: Floats, voltage: Floats) -> Floats:

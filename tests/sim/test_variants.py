@@ -188,6 +188,7 @@ def test_robots_that_differ_in_run_time_parameters_share_a_kernel() -> None:
         robot, description=robot.description.model_copy(update={"supply": supply})
     )
     assert native_kernel(weak) is native_kernel(robot)
+    assert physics_model(weak) is physics_model(robot)
     slow, fast = (
         simulate(BRIEF, "pi", ["P", "I"], PI, robot=r).outcome.objectives[0, 4]
         for r in (weak, robot)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
 from typing import Any, Final, Generic, TypeVar, TypeVarTuple
+from weakref import WeakValueDictionary
 
 import casadi as ca
 import numpy as np
@@ -100,6 +101,9 @@ class PhysicsModel:
         self.layout = Layout(robot)
         self._robot = robot
         self._limbs = _limbs_by_pinocchio(robot)
+        # Everything that the functions depend on.
+        drives = robot.description.contact_law, robot.is_torque_controlled, uneven
+        self.kind = outline(self._limbs), str(self.layout.slices), *drives
         self._symbols = _symbols(robot, self.layout, uneven=uneven)
 
     @cached_property
@@ -237,7 +241,12 @@ class PhysicsModel:
 
 @lru_cache(maxsize=16)
 def physics_model(robot: Robot, *, uneven: bool = False) -> PhysicsModel:
-    return PhysicsModel(robot, uneven=uneven)
+    """Return a robot's model; robots that differ in run-time parameters alone share one."""
+    model = PhysicsModel(robot, uneven=uneven)
+    return _models.setdefault(model.kind, model)
+
+
+_models: Final[WeakValueDictionary[Hashable, PhysicsModel]] = WeakValueDictionary()
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from tests.examples.walks import short_walk, torque_quadruped_files, walk
 FILE: Final = Path(__file__).with_name("numbers.json")
 
 ITERATIONS: Final = 5
-"""Of the demo's job, that are kept and run again: all of them would take half a minute."""
+"""Of the demo's job, that are kept: all of them would take half a minute."""
 
 DEMO: Final = JobSpec(preference="A", iterations=25, seed=2)
 """The job of `make demo`, by the default search method: 625 designs."""

@@ -30,8 +30,8 @@ def spec(recording: str, **changes: object) -> IdentificationSpec:
         "recordings": (recording,),
         "variables": VARIABLES,
         "fixed": {"stiffness_left_rear": TRUTH["stiffness_left_rear"]},
-        "optimizer": PsoSettings(particles=24, inertia_end=0.3),
-        "iterations": 20,
+        "optimizer": PsoSettings(particles=8, inertia_end=0.3),
+        "iterations": 15,
     }
     return IdentificationSpec.model_validate(document | changes)
 
@@ -128,7 +128,7 @@ def test_a_run_is_no_evidence_for_itself(store: Store, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
     jobs = DatabaseJobs(service, "")
     first, _ = service.submit(spec(recording))
-    again, _ = service.submit(spec(recording, iterations=20))
+    again, _ = service.submit(spec(recording, iterations=15))
     for other in (first, again):
         with pytest.raises(InvalidRequest, match="has the seed of job") as refused:
             jobs.parameters([first.id, other.id])

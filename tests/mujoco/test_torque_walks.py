@@ -19,7 +19,7 @@ DRIVES = {
     "joint-pd": {"Kp": 40.0, "Kd": 1.0, "feed_forward": 0.8},
     "pid": {"P": 0.5, "I": 0.1, "D": 0.01},
 }
-WALK = short_walk(cycles=1.0, cycle_time=0.5)
+WALK = short_walk(cycles=1.0, cycle_time=0.3)
 
 
 @pytest.mark.variants

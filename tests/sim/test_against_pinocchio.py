@@ -33,7 +33,7 @@ from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 
 pytestmark = pytest.mark.slow
 
-STATES = 500
+STATES = 100
 
 
 class Found:

@@ -20,7 +20,7 @@ from gaitswarm.sim.robot.robot import Robot
 from tests.examples.robots import changed
 from tests.examples.walks import PUBLISHED_A, short_walk, walk
 
-BRIEF = short_walk(cycle_time=0.4)
+BRIEF = short_walk(cycle_time=0.25)
 
 
 @pytest.fixture(scope="module")

@@ -39,7 +39,7 @@ def test_accelerations_agree_with_pinocchio_in_random_states(
     oracle.model.gravity.linear = gravity_on(slope.slope)
     p = pack_parameters(robot, slope, 2e-4)
     touching, worst = 0, 0.0
-    for _ in range(300):
+    for _ in range(100):
         q, v = random_state(rng, robot.n_joints)
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
         disturbance = rng.normal(size=robot.n_joints)
@@ -65,7 +65,7 @@ def test_accelerations_agree_with_pinocchio_in_random_states(
         np.testing.assert_allclose(
             load, torque - actuators.armature * reference[6:], rtol=1e-7, atol=1e-7
         )
-    assert touching > 60
+    assert touching > 20
     assert worst < 1e-10
 
 
@@ -106,7 +106,7 @@ def lossless() -> Robot:
 
 
 def energy_drift(robot: Robot, timestep: float) -> float:
-    """Relative drift of the energy over a tumbling free flight of 0.1 s."""
+    """Relative drift of the energy over a tumbling free flight of 0.05 s."""
     model, oracle = physics_model(robot), Oracle(robot)
     q, v = random_state(np.random.default_rng(11), robot.n_joints)
     q[2] = 10.0
@@ -117,7 +117,7 @@ def energy_drift(robot: Robot, timestep: float) -> float:
         return float(oracle.kinetic_energy(q, v) + potential)
 
     before = energy()
-    for _ in range(round(0.1 / timestep)):
+    for _ in range(round(0.05 / timestep)):
         still = np.zeros(18)
         q = np.array(model.drift(q, v, [], 0.5 * timestep)[0]).ravel()
         v = np.array(model.kick(q, v, [], still, still, p)[0]).ravel()
@@ -129,6 +129,6 @@ def energy_drift(robot: Robot, timestep: float) -> float:
 def test_energy_is_conserved_without_contact_and_friction() -> None:
     robot = lossless()
     assert not robot.actuators().viscous.any()
-    coarse, fine = energy_drift(robot, 2e-4), energy_drift(robot, 1e-4)
+    coarse, fine = energy_drift(robot, 4e-4), energy_drift(robot, 2e-4)
     assert coarse < 1e-3
     assert fine < 0.6 * coarse

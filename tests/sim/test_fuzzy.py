@@ -117,7 +117,6 @@ ANY_WEIGHT = st.one_of(st.sampled_from([0.0, 1e-290, 1e-9, 0.5, 1.0]), st.floats
 WIDTHS = st.one_of(st.sampled_from([0.01, 0.5, 1.0, 2.0, 10.0]), st.floats(0.01, 4.0))
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     st.tuples(ANY_WEIGHT, ANY_WEIGHT, ANY_WEIGHT, ANY_WEIGHT),
     st.sampled_from(Shape),

@@ -50,7 +50,7 @@ def walk(designs: np.ndarray, scenario: Scenario = SHORT) -> np.ndarray:
 @pytest.mark.variants("loaded-fast", "slope-fast", "turn-right-fast")
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_compiled_and_readable_kernel_agree(scenario: Scenario) -> None:
-    brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
+    brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.25})
     results = [walks.walk(brief, backend=b, log=True) for b in ("native", "reference")]
     fast, slow = results
     assert fast.outcome.statuses.tolist() == slow.outcome.statuses.tolist() == [Status.OK]

@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
-from gaitswarm.sim.kernel.dynamics.physics_step import Traced
+from gaitswarm.sim.kernel.dynamics.physics_step import Traced, physics_model
 from gaitswarm.sim.kernel.dynamics.spatial import Scalar, leaves
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
 from gaitswarm.sim.kernel.native import native_kernel
@@ -28,7 +28,7 @@ from tests.sim.pinocchio_oracle import Oracle, robot_named
 
 Pair = tuple[Scalar, Scalar]
 
-BRIEF = short_walk(cycle_time=0.5)
+BRIEF = short_walk(cycle_time=0.25)
 
 
 def mounted_quadruped() -> Robot:
@@ -106,6 +106,7 @@ def test_robots_with_limbs_of_one_kind_share_a_library_and_walk_by_their_own_con
     assert len(robot_constants(other)) == len(robot_constants(robot))
     assert (robot_constants(other) != robot_constants(robot)).mean() > 0.5
     assert native_kernel(other) is not native_kernel(robot)
+    assert physics_model(other) is not physics_model(robot)
     objectives = []
     for machine in (robot, other):
         fast, slow = (walk(BRIEF, robot=machine, backend=kind) for kind in ("native", "reference"))

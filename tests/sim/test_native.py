@@ -70,9 +70,9 @@ def test_processes_that_start_together_share_one_compilation(tmp_path: Path) -> 
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path)}
     running = [
         subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE)
-        for _ in range(4)
+        for _ in range(2)
     ]
-    assert [process.communicate(timeout=60)[0].strip() for process in running] == [b"7"] * 4
+    assert [process.communicate(timeout=60)[0].strip() for process in running] == [b"7"] * 2
     assert len(list((tmp_path / "gaitswarm").glob("race-*.so"))) == 1
 
 

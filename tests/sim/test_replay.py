@@ -125,7 +125,7 @@ def test_frames_are_the_nearest_ticks_with_their_exact_time(
 
 def logged_share_of_the_acceleration(robot: Robot) -> float:
     """Root mean square of a replay's, by f2; that sees every physics step, the log 4 ms."""
-    result = walk(SCENARIOS[0], robot=robot, log=True)
+    result = walk(BRIEF, robot=robot, log=True)
     (log,) = result.logs
     assert log is not None
     norm = np.linalg.norm(replay(robot, log, rate=500).body_acceleration, axis=1)
@@ -147,7 +147,7 @@ def test_touch_downs_on_the_default_robots_dampers_are_shorter_than_the_logs_tic
 
 def test_with_backlash_the_link_is_shown_not_its_motor() -> None:
     robot = load_robot(RobotVariant(backlash=(2.5, 1.0, 1.0)))
-    log, _ = walked(robot)
+    log, _ = walked(robot, BRIEF.model_copy(update={"cycle_time": 0.5}))
     shown = replay(robot, log, rate=100)
     assert np.abs(shown.joint_angle - shown.motor_angle).max() > 0.015
     below = shown.link_pose[0, 0, 2] + feet_below_body(robot, shown.joint_angle[0])

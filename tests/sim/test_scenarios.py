@@ -83,7 +83,8 @@ def test_a_turn_bends_to_its_side_and_distance_follows_the_heading(turn: float) 
 
 def test_a_backward_walk_goes_backwards_and_is_judged_along_its_way() -> None:
     drive = {"P": 0.45, "I": 0.1}
-    ahead, back = (walk(find_scenario(n), drive, "pi", log=True) for n in ("straight", "backward"))
+    ahead = walk(find_scenario("straight"), drive, "pi")
+    back = walk(find_scenario("backward"), drive, "pi", log=True)
     (log,) = back.logs
     assert log is not None
     assert back.outcome.statuses.tolist() == [Status.OK]

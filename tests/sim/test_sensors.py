@@ -74,11 +74,12 @@ def readings(errors: SensorErrors, ticks: int, joints: int = 18) -> tuple[Floats
 
 
 def test_noise_is_white_and_nearly_normal() -> None:
-    angles, currents = readings(SensorErrors(angle_noise=0.3, current_noise=2.0, seed=5), 4000)
+    ticks = 1500
+    angles, currents = readings(SensorErrors(angle_noise=0.3, current_noise=2.0, seed=5), ticks)
     both = np.concatenate(
-        [(angles - np.arange(4000.0)[:, np.newaxis]) / 0.3, currents / 2.0], axis=1
+        [(angles - np.arange(float(ticks))[:, np.newaxis]) / 0.3, currents / 2.0], axis=1
     )
-    error = 4.5 / np.sqrt(4000.0)
+    error = 4.5 / np.sqrt(ticks)
     assert np.abs(both.mean(axis=0)).max() < error
     assert np.abs(both.std(axis=0) - 1.0).max() < error
     # Joints and sensors, neighbouring ticks.

@@ -159,7 +159,7 @@ def test_accelerations_agree_with_pinocchio_in_random_states(line: bool) -> None
     p = pack_parameters(robot, WALK, 2e-4)
     springs = np.zeros(2 * robot.n_joints)
     limited, worst = 0, 0.0
-    for _ in range(300):
+    for _ in range(100):
         q, v = random_state(rng, robot.n_joints)
         v[6:] *= 5.0
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
@@ -194,7 +194,7 @@ def test_accelerations_agree_with_pinocchio_in_random_states(line: bool) -> None
         reference = pin.aba(oracle.model, oracle.data, oracle.q(q), oracle.v(v), tau, external)
         reference = reference[oracle.v_index]
         worst = max(worst, float(np.abs(found - reference).max() / np.abs(reference).max()))
-    assert limited > 50
+    assert limited > 16
     assert worst < 1e-10
 
 
@@ -234,7 +234,7 @@ def test_electrical_energy_is_heat_and_what_the_bodies_gain(timestep: float) -> 
         return float(oracle.kinetic_energy(q, v) + potential)
 
     before, spent, heat = energy(), 0.0, 0.0
-    for _ in range(round(0.1 / timestep)):
+    for _ in range(round(0.04 / timestep)):
         q = np.array(model.drift(q, v, [], 0.5 * timestep)[0]).ravel()
         v, _, _, integrands, *_ = (np.array(x).ravel() for x in model.kick(q, v, [], duty, none, p))
         q = np.array(model.drift(q, v, [], 0.5 * timestep)[0]).ravel()

@@ -358,13 +358,13 @@ def test_designs_in_one_world_have_the_bits_of_worlds_of_one_design(name: str) -
     (drawn,) = sample_worlds(1, 5)
     known = tuple(zip(NAMES, drawn.tolist(), strict=True))
     designs = np.array([[0.45, 0.1], [0.2, 0.0]])
-    scenario = short_walk()
+    scenario = short_walk(cycle_time=0.4)
     robot, gains = VARIANTS[name], ("P", "I")
     perturbed = PerturbedWalk("short", robot, "pi", scenario, known, gains)
     together = perturbed.simulate(designs, log=True)
     measured = MeasuredPerturbedWalk("short", robot, "pi", scenario, known, gains).run(designs)
     for row, (p, i) in enumerate(designs.tolist()):
-        alone = case(*NAMES, robot=robot, design={"P": p, "I": i}).simulate(
+        alone = case(*NAMES, scenario=scenario, robot=robot, design={"P": p, "I": i}).simulate(
             drawn[np.newaxis], log=True
         )
         columns = [alone.outcome.objectives, alone.measurements.array()]

@@ -138,7 +138,7 @@ def test_under_the_runner_our_rows_have_the_bits_of_a_certificate_without_engine
     store: Store, evaluator: Evaluator
 ) -> None:
     service, rows, walked = JobService(store), [], []
-    plain, spec = (small(engines=e, scenarios=[SHORT_WALK]) for e in ([], ["mujoco"]))
+    plain, spec = (small(engines=e, scenarios=[SHORT_WALK], worlds=3) for e in ([], ["mujoco"]))
     for asked_for in (plain, spec, spec):
         job, _ = service.submit(asked_for)
         ended = run_embedded(store, evaluator, job.id)

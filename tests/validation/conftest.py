@@ -1,4 +1,4 @@
-"""One synthetic walk, its robot and its simulated counterpart: they take a second to compute."""
+"""One synthetic walk of a cycle, its robot and its simulated counterpart."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ class TwoWalks:
 
 @pytest.fixture(scope="session")
 def walks() -> TwoWalks:
-    robot, scenario = load_robot("szabadka2"), find_scenario("normal-fast")
+    robot, scenario = (
+        load_robot("szabadka2"),
+        find_scenario("normal-fast").model_copy(update={"cycles": 1.0}),
+    )
     walk = logged_walk(scenario, robot=robot)
     synthetic = synthetic_log(robot, scenario, "fuzzy-pi", PUBLISHED_A, seed=7)
     return TwoWalks(

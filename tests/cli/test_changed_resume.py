@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sqlite3
 import subprocess
 from collections.abc import Callable
 from contextlib import closing
@@ -93,21 +94,30 @@ def test_a_job_does_not_mix_numbers_that_depend_on_something_else(
 
 
 def test_an_accepted_change_is_recorded_from_its_iteration(
-    extended: Finished, tmp_path: Path, gaitswarm: Gaitswarm
+    extended: Finished, gaitswarm: Gaitswarm
 ) -> None:
+    (record,) = extended.job["provenance"]
+    digest = record["provenance"]["simulation"]["robot_digest"]
+    with closing(sqlite3.connect(extended.db)) as connection, connection:
+        change = "UPDATE jobs SET provenance = replace(provenance, ?, 'of another robot')"
+        connection.execute(change, [digest])
     before = history(extended, gaitswarm)
-    resumed = resume(extended, "--accept-changes", **another_robot_file(tmp_path))
-    assert resumed.returncode == 0, resumed.stderr
+    again = ("optimize", "--resume", extended.id, "--db", extended.db, "--evaluator", "in-process")
+    refused = gaitswarm(*again)
+    assert refused.code == 4 and "--accept-changes" in refused.err
+    assert history(extended, gaitswarm) == before
+    resumed = gaitswarm(*again, "--accept-changes")
+    assert resumed.code == 0, resumed.err
     after = history(extended, gaitswarm)
     assert after["iterations"][:2] == before["iterations"]
     job = gaitswarm("status", extended.id, "--db", extended.db, "--json").json
     assert (job["state"], job["iterations"]) == ("succeeded", 4)
     assert after["provenance"] == job["provenance"]
     first, second = job["provenance"]
-    assert [first, *extended.job["provenance"]] == [first, first]
     assert (first["from_iteration"], second["from_iteration"]) == (0, 2)
     was, now = (entry["provenance"]["simulation"] for entry in (first, second))
     assert {field for field in was if was[field] != now[field]} == {"robot_digest"}
+    assert (was["robot_digest"], now["robot_digest"]) == ("of another robot", digest)
     said = gaitswarm("status", extended.id, "--db", extended.db).out
     assert "computed by from iteration 2" in said and now["robot_digest"][:8] in said
 

@@ -59,7 +59,7 @@ def test_a_full_device_is_exit_code_5(
     assert done.stderr == "gaitswarm: standard output cannot be written: No space left on device\n"
 
 
-@pytest.mark.variants("a table")
+@pytest.mark.variants("help of a command")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", WRITING)
 def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str) -> None:
@@ -112,6 +112,7 @@ def test_a_data_directory_that_cannot_be_created_is_exit_code_5_with_a_remedy(
     assert "Traceback" not in done.err
 
 
+@pytest.mark.thorough("test_where_the_cache_cannot_be_written_a_private_one_serves")
 @pytest.mark.slow
 def test_unwritable_cache_and_home_directories_are_no_error(
     small_spec: Path, tmp_path: Path

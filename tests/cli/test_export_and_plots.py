@@ -86,37 +86,27 @@ def test_the_convergence_is_drawn_with_named_axes(
 
 
 @pytest.mark.slow
-def test_the_surface_of_a_fuzzy_design_is_drawn_with_units(
-    gaitswarm: Gaitswarm, tmp_path: Path
-) -> None:
-    path = tmp_path / "surface.svg"
-    drawn = gaitswarm("plot", "surface", "--design", "published:A", "-o", path)
-    assert drawn.code == 0, drawn.err
-    picture = path.read_text(encoding="utf-8")
-    assert "angle error" in picture
-    assert "[PWM counts]" in picture
-
-
-@pytest.mark.slow
-def test_a_picture_leaves_the_style_of_later_figures_as_it_was(
+def test_the_surface_of_a_fuzzy_design_is_drawn_with_units_and_leaves_the_style_of_others(
     gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
 ) -> None:
-    convergence = [tmp_path / "before.png", tmp_path / "after.png"]
-    for path in convergence:
-        drawn = gaitswarm("plot", "convergence", finished.id, "-o", path, "--db", finished.db)
+    before, surface, after = (tmp_path / name for name in ("before.png", "s.svg", "after.png"))
+    for path, plotted in (
+        (before, ("convergence", finished.id, "--db", finished.db)),
+        (surface, ("surface", "--design", "published:A")),
+        (after, ("convergence", finished.id, "--db", finished.db)),
+    ):
+        drawn = gaitswarm("plot", *plotted, "-o", path)
         assert drawn.code == 0, drawn.err
-        assert gaitswarm("plot", "surface", "-o", tmp_path / "surface.png").code == 0
-    before, after = (path.read_bytes() for path in convergence)
-    assert before == after
+    picture = surface.read_text(encoding="utf-8")
+    assert "angle error" in picture and "[PWM counts]" in picture
+    assert before.read_bytes().startswith(b"\x89PNG")
+    assert before.read_bytes() == after.read_bytes()
 
 
-@pytest.mark.slow
 def test_pictures_are_png_svg_or_pdf(
     gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
 ) -> None:
-    png, gif = tmp_path / "c.png", tmp_path / "c.gif"
-    plot = ("plot", "convergence", finished.id, "--db", finished.db, "-o")
-    assert gaitswarm(*plot, png).code == 0
-    assert png.read_bytes().startswith(b"\x89PNG")
-    assert gaitswarm(*plot, gif).code == 2
+    gif = tmp_path / "c.gif"
+    refused = gaitswarm("plot", "convergence", finished.id, "--db", finished.db, "-o", gif)
+    assert refused.code == 2
     assert not gif.exists()

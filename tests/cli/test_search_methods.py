@@ -110,6 +110,3 @@ def test_progress_of_uneven_iterations_is_in_designs(
     assert (watched.code, "6 iterations, 12/12 designs" in watched.err) == (0, True)
     extended = gaitswarm("extend", job_id, "--iterations", 5, "--db", db)
     assert "with 12 of 15 designs" in extended.out
-    image = db.with_name("convergence.svg")
-    assert gaitswarm("plot", "convergence", job_id, "--output", image, "--db", db).code == 0
-    assert "fitness" in image.read_text()

@@ -24,7 +24,7 @@ from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.forked import PROCESSES
 from tests.examples.jobs import history
-from tests.examples.preferences import small
+from tests.examples.preferences import DOCUMENT, small
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 from tests.resume import job_process
 
@@ -174,7 +174,7 @@ IN_WORLDS = {"count": 3, "ranges": ["world_seed"], "aggregate": "cvar"}
 @pytest.mark.parametrize(
     "spec",
     [
-        small(iterations=2, worlds=2),
+        small(iterations=2, worlds=1, tuning=DOCUMENT["tuning"] | {"iterations": 1}),
         JobSpec.model_validate(
             SPEC.model_dump() | {"scenarios": [ROUGH], "worlds": IN_WORLDS, "iterations": 2}
         ).with_gait_searched(),

@@ -21,14 +21,6 @@ def held_to_wait_for(event: Any) -> threading.Condition:
     return condition
 
 
-def told_once_while_it_begins_to_wait() -> None:
-    stop = threading.Event()
-    with stop_on_signals(stop):
-        with held_to_wait_for(stop):
-            signal.raise_signal(signal.SIGTERM)
-        stop.wait()
-
-
 def told_twice_while_it_begins_to_wait() -> None:
     stop, at_once = threading.Event(), threading.Event()
     with stop_on_signals(stop, at_once):
@@ -50,12 +42,7 @@ def told_once_more_than_can_be_heard() -> None:
 
 
 @pytest.mark.parametrize(
-    "program",
-    [
-        told_once_while_it_begins_to_wait,
-        told_twice_while_it_begins_to_wait,
-        told_once_more_than_can_be_heard,
-    ],
+    "program", [told_twice_while_it_begins_to_wait, told_once_more_than_can_be_heard]
 )
 def test_a_process_that_waits_for_a_signal_continues_when_it_comes(
     program: Callable[[], None],

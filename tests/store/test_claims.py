@@ -209,6 +209,7 @@ def finished(store: Store, clock: Clock, claim: Claim) -> None:
     store.commit(claim, completed(0), None)
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-overtaken")
 @pytest.mark.parametrize(
     "lose",
     [overtaken, overtaken_by_itself, cancelled, released, finished],

@@ -94,7 +94,7 @@ def test_work_is_dropped_when_it_is_stopped(evaluator: Evaluator) -> None:
     asked = itertools.count()
     begun = time.monotonic()
     with pytest.raises(EvaluationStopped):
-        evaluator.evaluate(slow(200, 0.3), lambda: next(asked) > 1)
+        evaluator.evaluate(slow(400, 0.1), lambda: next(asked) > 1)
     assert time.monotonic() - begun < 10.0
 
 
@@ -181,7 +181,7 @@ def test_a_small_job_is_served_while_a_big_one_runs(evaluator: Evaluator) -> Non
 
     def run_big() -> None:
         try:
-            evaluator.evaluate(slow(200, 0.3, job_id="big"), should_stop)
+            evaluator.evaluate(slow(400, 0.1, job_id="big"), should_stop)
         except EvaluationStopped:
             return
         big_ended.set()

@@ -12,7 +12,7 @@ from tests.examples.commands import synthesize
 pytestmark = pytest.mark.slow
 
 WALK = ("--design", "published:A", "--scenario")
-FIT = ("--evaluator", "in-process", "--particles", "6", "--iterations", "4")
+FIT = ("--evaluator", "in-process", "--particles", "4", "--iterations", "2")
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ def ridge(designs: Floats) -> Floats:
 
 
 def test_a_narrow_valley_across_the_axes_is_learned() -> None:
-    asked = designs_asked("cma-es", BOX, ridge, 2_500)
+    asked = designs_asked("cma-es", BOX, ridge, 1_500)
     assert float(ridge(np.vstack(asked)).min()) < 1e-6
 
 

@@ -196,22 +196,25 @@ def test_every_method_learns_to_keep_constraints_and_resumes(name: str) -> None:
         numbers = feasible_first(np.where(violation > 0.0, np.inf, distance), violation)
         return np.stack([numbers, numbers], axis=1) if METHODS[name].multi_objective else numbers
 
-    search = create_search(settings, space, 200, 1, np.empty((0, 0)))
-    best = math.inf
+    # A model of all designs before takes long: that of few already leads close to the best.
+    budget = 40 if name == "bayesian" else 200
+    search = create_search(settings, space, budget, 1, np.empty((0, 0)))
+    best, resumed = math.inf, False
     with np.errstate(all="raise", under="ignore"):
-        while search.evaluations < 200:
-            points = search.ask(200 - search.evaluations)
+        while search.evaluations < budget:
+            points = search.ask(budget - search.evaluations)
             state = stored_state(search)
             values = feedback(points)
             best = min(best, float(values.min()))
             search.tell(values)
-            if 90 < search.evaluations < 110:
-                again = create_search(settings, space, 200, 1, np.empty((0, 0)))
+            if not resumed and search.evaluations > budget // 2:
+                resumed = True
+                again = create_search(settings, space, budget, 1, np.empty((0, 0)))
                 again.load(json.loads(json.dumps(state)))
                 again.tell(values)
                 assert again.ask().tobytes() == search.ask().tobytes()
     # The nearest feasible point has 20.33; random points come within 20.6.
-    assert 20.33 < best < (21.0 if name == "random" else 20.9)
+    assert resumed and 20.33 < best < (21.0 if name == "random" else 20.9)
 
 
 def run(store: Store, job: JobSpec) -> Job:
@@ -245,11 +248,8 @@ def test_the_best_design_is_the_best_feasible_one(store: Store) -> None:
         assert "infeasible designs are not those" in check_history(store, edited).problem
 
 
-@pytest.mark.parametrize("method", ["pso", "cma-es"])
-def test_a_constrained_job_killed_after_every_iteration_has_the_same_bits(
-    store: Store, method: str
-) -> None:
-    job = spec(FAST, optimizer={"name": method, "particles": 4})
+def test_a_constrained_job_killed_after_every_iteration_has_the_same_bits(store: Store) -> None:
+    job = spec(FAST)
     whole = run(store, job)
     job_id = store.create_job(job.resolved())[0].id
 
@@ -417,16 +417,13 @@ def test_a_fork_is_judged_by_its_own_constraints_without_simulation(store: Store
     assert isinstance(lifted.spec, JobSpec) and lifted.spec.constraints == ()
 
 
-OTHER_WEIGHTS: list[dict[str, Any]] = [
-    {"scenario_weights": {"slope-fast": 4.0}},
-    {"scenario_aggregate": "worst"},
-]
+WEIGHTED: dict[str, Any] = {"scenario_weights": {"slope-fast": 4.0}}
+WORST: dict[str, Any] = {"scenario_aggregate": "worst"}
 
 
-@pytest.mark.parametrize("measure", OTHER_WEIGHTS)
-@pytest.mark.parametrize("before", [{}, *OTHER_WEIGHTS])
+@pytest.mark.parametrize(("before", "measure"), [({}, WORST), (WORST, WEIGHTED)])
 def test_a_history_is_forked_and_ranked_with_other_weights_of_scenarios(
-    store: Store, measure: dict[str, Any], before: dict[str, Any]
+    store: Store, before: dict[str, Any], measure: dict[str, Any]
 ) -> None:
     parent = run(store, spec(FAST, **before))
     service = JobService(store)

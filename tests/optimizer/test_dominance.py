@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis import front
@@ -27,7 +27,6 @@ def by_definition(points: np.ndarray) -> np.ndarray:
     values=st.sampled_from([2, 4, 1000]),
     block=st.sampled_from([1, 4, 100]),
 )
-@settings(max_examples=200, deadline=None)
 def test_it_is_what_the_definition_says(
     seed: int, rows: int, objectives: int, values: int, block: int
 ) -> None:

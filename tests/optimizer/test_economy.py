@@ -23,7 +23,10 @@ from gaitswarm.services.optimizer.run.execution import (
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history
-from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
+from tests.optimizer.formula import HERE, FormulaEvaluator, job, walk
+from tests.optimizer.formula import SPEC as LONGER
+
+SPEC = LONGER.model_copy(update={"iterations": 3})
 
 
 class CountingEvaluator(FormulaEvaluator):

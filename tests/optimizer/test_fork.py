@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -22,7 +23,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.services.optimizer.run.runner import run_embedded
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.outcome import Status
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SINGLE, SPEC, TradeOff
@@ -49,6 +50,27 @@ def run(store: Store, job: Job) -> Job:
 def parent(store: Store, spec: JobSpec = SPEC, **given: Any) -> Job:
     asked = JobSpec.model_validate(spec.model_dump() | given)
     return run(store, service(store).submit(asked)[0])
+
+
+@pytest.fixture(scope="module")
+def finished(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with the job that most tests fork."""
+    path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("parent") / "jobs.db"))
+    with closing(open_store(str(path))) as store:
+        parent(store)
+    return path
+
+
+@pytest.fixture
+def database(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(finished, tmp_path / "jobs.db"))
+
+
+@pytest.fixture
+def job(store: Store) -> Job:
+    """The only job, which has run `SPEC`."""
+    (only,) = store.jobs().items
+    return store.job(only.id)
 
 
 def fork(store: Store, job: Job, iteration: int, **given: Any) -> Job:
@@ -86,9 +108,7 @@ def test_a_fork_with_the_same_settings_continues_bit_for_bit_as_its_parent(
     assert forked.progress.best_fitness == store.job(job.id).progress.best_fitness
 
 
-@pytest.mark.parametrize("method", ["pso", "random"])
-def test_a_search_that_takes_too_long_to_restore_is_refused(store: Store, method: str) -> None:
-    job = parent(store, optimizer={"name": method, "particles": PARTICLES})
+def test_a_search_that_takes_too_long_to_restore_is_refused(store: Store, job: Job) -> None:
     hasty = JobService(store, longest_fork=0.0)
     request = ForkRequest(from_iteration=3)
     with pytest.raises(
@@ -101,8 +121,9 @@ def test_a_search_that_takes_too_long_to_restore_is_refused(store: Store, method
     assert hasty.fork(job.id, another)[0].lineage is not None
 
 
-def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: Store) -> None:
-    job = parent(store)
+def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(
+    store: Store, job: Job
+) -> None:
     forked = fork(store, job, 2)
     assert forked.state is JobState.QUEUED
     assert (forked.progress.iterations, forked.progress.evaluations) == (2, 2 * PARTICLES)
@@ -119,8 +140,7 @@ def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: S
     assert best.fitness == forked.progress.best_fitness == listed[-1].best_so_far
 
 
-def test_lineage_says_what_was_taken_over(store: Store) -> None:
-    job = parent(store)
+def test_lineage_says_what_was_taken_over(store: Store, job: Job) -> None:
     lineage = fork(store, job, 2).lineage
     assert lineage is not None
     assert (lineage.parent, lineage.from_iteration, lineage.carried) == (job.id, 2, "search")
@@ -128,8 +148,7 @@ def test_lineage_says_what_was_taken_over(store: Store) -> None:
     assert job.lineage is None
 
 
-def test_forks_are_found_by_their_parent(store: Store) -> None:
-    job = parent(store)
+def test_forks_are_found_by_their_parent(store: Store, job: Job) -> None:
     forks = [fork(store, job, k) for k in (1, 2)]
     fork(store, run(store, forks[0]), 3)
     for order in (JobOrder.CREATED, JobOrder.NAME):
@@ -138,8 +157,7 @@ def test_forks_are_found_by_their_parent(store: Store) -> None:
     assert store.jobs(parent="\0").items == ()
 
 
-def test_a_fork_stays_when_its_parent_goes(store: Store, database: Path) -> None:
-    job = parent(store)
+def test_a_fork_stays_when_its_parent_goes(store: Store, job: Job, database: Path) -> None:
     forked, whole = fork(store, job, 3), history(store, job.id)
     for table in ("reevaluations", "evaluations", "iterations"):
         edit(database, f"DELETE FROM {table} WHERE job_id = ?", job.id)  # noqa: S608
@@ -151,8 +169,8 @@ def test_a_fork_stays_when_its_parent_goes(store: Store, database: Path) -> None
 
 def test_a_fork_whose_iterations_are_gone_when_it_is_stored_is_not_stored_at_all(
     store: Store,
+    job: Job,
 ) -> None:
-    job = parent(store)
     lineage = Lineage(parent=job.id, from_iteration=7, carried="search")
     taken = TakenHistory(state={}, fitness=None, provenance=job.provenance)
     with pytest.raises(Conflict, match="has not the 7 iterations any more"):
@@ -160,8 +178,9 @@ def test_a_fork_whose_iterations_are_gone_when_it_is_stored_is_not_stored_at_all
     assert [found.id for found in store.jobs().items] == [job.id]
 
 
-def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store: Store) -> None:
-    job = parent(store)
+def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(
+    store: Store, job: Job
+) -> None:
     store.extend(job.id, 9)
     job = run(store, job)
     first = run(store, fork(store, job, 4, iterations=12))
@@ -191,8 +210,8 @@ def test_another_preference_rejudges_the_history_and_the_search(store: Store, me
 
 def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
     store: Store,
+    job: Job,
 ) -> None:
-    job = parent(store)
     forked = fork(store, job, 4, preference=SPEED)
     claim = store.claim("runner", lease_seconds=30.0, job_id=forked.id)
     assert claim is not None and claim.answered is not None
@@ -214,7 +233,7 @@ def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
 def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_preference(
     store: Store, method: str
 ) -> None:
-    job = parent(store, optimizer={"name": method, "particles": PARTICLES}, iterations=25)
+    job = parent(store, optimizer={"name": method, "particles": PARTICLES}, iterations=12)
     forked = fork(store, job, job.progress.iterations, preference=SPEED, start_count=3)
     assert forked.lineage is not None
     assert (forked.lineage.carried, forked.lineage.evaluations) == ("designs", 0)
@@ -241,9 +260,8 @@ def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_pr
     ids=["scenarios", "robot", "method", "settings", "both"],
 )
 def test_where_outcomes_or_search_do_not_hold_the_fork_starts_from_the_best_designs(
-    store: Store, given: dict[str, Any], reason: str
+    store: Store, job: Job, given: dict[str, Any], reason: str
 ) -> None:
-    job = parent(store)
     forked = fork(store, job, 3, **given)
     assert forked.lineage is not None
     assert forked.lineage.carried == "designs"
@@ -271,8 +289,9 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
     assert other is not None and "in double" in other.reason
 
 
-def test_a_fork_within_other_bounds_searches_there_from_the_best_designs(store: Store) -> None:
-    job = parent(store)
+def test_a_fork_within_other_bounds_searches_there_from_the_best_designs(
+    store: Store, job: Job
+) -> None:
     forked = fork(store, job, 3, bounds={"P": [0.01, 3.0]}, preference=SPEED)
     before, after = ({v.name: v for v in j.spec.design_space().variables} for j in (job, forked))
     assert (after["P"].low, after["P"].high) == (0.01, 3.0)
@@ -307,17 +326,15 @@ def test_a_fork_within_other_bounds_searches_there_from_the_best_designs(store: 
     ],
 )
 def test_an_invalid_fork_is_refused_by_field_and_nothing_is_stored(
-    store: Store, given: dict[str, Any], field: str
+    store: Store, job: Job, given: dict[str, Any], field: str
 ) -> None:
-    job = parent(store)
     with pytest.raises(InvalidRequest) as refused:
         service(store).fork(job.id, ForkRequest.model_validate(given))
     assert refused.value.field == field or str(refused.value).startswith(field)
     assert [found.id for found in store.jobs().items] == [job.id]
 
 
-def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: Store) -> None:
-    job = parent(store)
+def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: Store, job: Job) -> None:
     other = JobService(store, provenance=lambda _: HERE)
     with pytest.raises(ProvenanceChanged, match="other code of search and judgement"):
         other.fork(job.id, ForkRequest(from_iteration=2))
@@ -326,23 +343,22 @@ def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: Store) -
     assert forked.provenance == job.provenance[:1]
 
 
-def test_a_job_of_failed_designs_has_nothing_to_start_from(store: Store, database: Path) -> None:
-    job = parent(store)
+def test_a_job_of_failed_designs_has_nothing_to_start_from(
+    store: Store, job: Job, database: Path
+) -> None:
     edit(database, "UPDATE evaluations SET fitness = 9e999")
     with pytest.raises(Conflict, match="there is none to start from"):
         fork(store, job, 2, robot="szabadka2")
 
 
-def test_the_same_key_makes_one_fork(store: Store) -> None:
-    job = parent(store)
+def test_the_same_key_makes_one_fork(store: Store, job: Job) -> None:
     request = ForkRequest(from_iteration=2)
     first, new = service(store).fork(job.id, request, idempotency_key="k")
     again, repeated = service(store).fork(job.id, request, idempotency_key="k")
     assert (new, repeated, again.id) == (True, False, first.id)
 
 
-def test_rates_count_what_the_fork_has_walked_itself(store: Store) -> None:
-    job = parent(store)
+def test_rates_count_what_the_fork_has_walked_itself(store: Store, job: Job) -> None:
     forked = fork(store, job, 5)
     assert (forked.progress.compute_seconds, forked.progress.evaluations_walked) == (0.0, 0)
     assert time_left(forked, forked.created_at).evaluations_per_second is None

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.front import hypervolume_curve
@@ -55,7 +55,6 @@ def test_known_volumes(points: list[list[float]], volumes: list[float]) -> None:
     objectives=st.integers(1, 6),
     values=st.sampled_from([3, 5, 10_000]),
 )
-@settings(max_examples=50, deadline=None)
 def test_it_is_the_volume_of_the_union_after_each_point(
     seed: int, count: int, objectives: int, values: int
 ) -> None:

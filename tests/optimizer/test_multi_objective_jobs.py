@@ -89,7 +89,7 @@ def test_the_search_learns_geometric_means_of_each_objective_without_biases(stor
 def test_the_path_depends_on_no_preference_and_the_best_is_the_one_by_the_jobs(
     store: Store,
 ) -> None:
-    jobs = {name: run(store, spec(preference=name, iterations=12)) for name in ("A", "C")}
+    jobs = {name: run(store, spec(preference=name)) for name in ("A", "C")}
     designs = {name: [row[2:5] for row in history(store, job.id)] for name, job in jobs.items()}
     assert designs["A"] == designs["C"]
     for name, job in jobs.items():
@@ -107,7 +107,7 @@ def test_the_path_depends_on_no_preference_and_the_best_is_the_one_by_the_jobs(
 def test_a_job_killed_after_every_iteration_equals_one_that_never_was(
     store: Store, precision: str
 ) -> None:
-    wanted = spec(precision=precision, iterations=9)
+    wanted = spec(precision=precision)
     whole = run(store, wanted)
     killed = run_through_kills(store, store.create_job(wanted)[0].id)
     assert history(store, killed.id) == history(store, whole.id)
@@ -121,17 +121,17 @@ def test_a_job_killed_after_every_iteration_equals_one_that_never_was(
 
 def test_an_extended_job_equals_one_with_the_greater_budget_from_the_start(store: Store) -> None:
     job = run(store, spec())
-    store.extend(job.id, SPEC.iterations + 4)
+    store.extend(job.id, SPEC.iterations + 2)
     extended = run_embedded(store, TradeOff(), job.id)
-    assert extended.progress.evaluations == (SPEC.iterations + 4) * HYPE["particles"]
+    assert extended.progress.evaluations == (SPEC.iterations + 2) * HYPE["particles"]
     assert history(store, job.id) == history(
-        store, run(store, spec(iterations=SPEC.iterations + 4)).id
+        store, run(store, spec(iterations=SPEC.iterations + 2)).id
     )
 
 
 def test_a_fork_under_another_preference_continues_bit_for_bit_as_its_parent(store: Store) -> None:
     service = JobService(store)
-    job, _ = service.submit(spec(iterations=9))
+    job, _ = service.submit(spec(iterations=7))
     run_embedded(store, TradeOff(), job.id)
     request = ForkRequest.model_validate({"from_iteration": 4, "preference": "C"})
     forked, _ = service.fork(job.id, request)
@@ -149,7 +149,7 @@ def test_start_designs_are_judged_first_and_are_members(store: Store) -> None:
     space, rows = job.spec.design_space(), store.evaluations_between(job.id, 0, 100)
     assert [space.shown(row.design.tolist()) for row in rows[:2]] == list(designs)
     assert job.progress.evaluations == job.spec.budget
-    cold = run(store, spec(iterations=9))
+    cold = run(store, spec(iterations=7))
     assert [row[2] for row in history(store, job.id)][6:] != [
         row[2] for row in history(store, cold.id)
     ][6:]

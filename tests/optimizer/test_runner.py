@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import logging
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from functools import partialmethod
 from pathlib import Path
 from typing import Any, cast
@@ -28,10 +30,20 @@ from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.outcome import Outcome
-from tests.examples.jobs import history
+from tests.examples.jobs import Bits, history
 from tests.examples.processes import eventually
 from tests.optimizer.formula import BRISK, SINGLE, SPEC, FormulaEvaluator, queue, run
 from tests.store.examples import Clock
+
+
+@pytest.fixture(scope="module")
+def undisturbed(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Bits]:
+    """The history of a job that nothing disturbed."""
+    path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("undisturbed") / "jobs.db"))
+    with closing(open_store(str(path))) as store:
+        job_id = queue(store)
+        run(store, FormulaEvaluator())
+        return history(store, job_id)
 
 
 def test_a_claimed_job_runs_to_its_end(store: Store) -> None:
@@ -49,9 +61,9 @@ def test_a_claimed_job_runs_to_its_end(store: Store) -> None:
     assert seen == [*running, (SPEC.iterations - 1, JobState.SUCCEEDED)]
 
 
-def test_a_pause_waits_for_the_iteration_and_resuming_changes_no_bit(store: Store) -> None:
-    whole = queue(store)
-    run(store, FormulaEvaluator())
+def test_a_pause_waits_for_the_iteration_and_resuming_changes_no_bit(
+    store: Store, undisturbed: list[Bits]
+) -> None:
     paused = queue(store)
 
     def pause(done: CompletedIteration, state: JobState) -> None:
@@ -62,7 +74,7 @@ def test_a_pause_waits_for_the_iteration_and_resuming_changes_no_bit(store: Stor
     assert (job.state, job.progress.iterations) == (JobState.PAUSED, 4)
     store.command(paused, Command.RESUME)
     assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
-    assert history(store, paused) == history(store, whole)
+    assert history(store, paused) == undisturbed
 
 
 def test_a_cancellation_drops_the_walks_under_way(store: Store) -> None:
@@ -129,9 +141,9 @@ def set_after(awaited: threading.Event, following: threading.Event) -> None:
     following.set()
 
 
-def test_a_stopped_run_gives_its_job_back_for_another_to_finish(store: Store) -> None:
-    whole = queue(store)
-    run(store, FormulaEvaluator())
+def test_a_stopped_run_gives_its_job_back_for_another_to_finish(
+    store: Store, undisturbed: list[Bits]
+) -> None:
     job_id = queue(store)
     evaluator = FormulaEvaluator()
     evaluator.hold.set()
@@ -139,12 +151,12 @@ def test_a_stopped_run_gives_its_job_back_for_another_to_finish(store: Store) ->
     threading.Thread(target=set_after, args=(evaluator.entered, stop)).start()
     assert run(store, evaluator, stop).state is JobState.QUEUED
     assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
-    assert history(store, job_id) == history(store, whole)
+    assert history(store, job_id) == undisturbed
 
 
-def test_workers_out_of_reach_delay_a_job_and_change_no_bit(store: Store) -> None:
-    whole = queue(store)
-    run(store, FormulaEvaluator())
+def test_workers_out_of_reach_delay_a_job_and_change_no_bit(
+    store: Store, undisturbed: list[Bits]
+) -> None:
     job_id = queue(store)
     now = [0.0]
     gone = EvaluatorUnavailable("no route to host")
@@ -157,12 +169,12 @@ def test_workers_out_of_reach_delay_a_job_and_change_no_bit(store: Store) -> Non
     )
     assert job.state is JobState.SUCCEEDED
     assert now[0] == pytest.approx(1 + 2 + 4 + 1)
-    assert history(store, job_id) == history(store, whole)
+    assert history(store, job_id) == undisturbed
 
 
-def test_a_job_outlives_workers_that_are_away_for_days(store: Store) -> None:
-    whole = queue(store)
-    run(store, FormulaEvaluator())
+def test_a_job_outlives_workers_that_are_away_for_days(
+    store: Store, undisturbed: list[Bits]
+) -> None:
     job_id = queue(store)
     now = [0.0]
     gone = EvaluatorUnavailable("no route to host")
@@ -176,7 +188,7 @@ def test_a_job_outlives_workers_that_are_away_for_days(store: Store) -> None:
     )
     assert now[0] > 3 * 86_400.0
     assert (job.state, job.error) == (JobState.SUCCEEDED, None)
-    assert history(store, job_id) == history(store, whole)
+    assert history(store, job_id) == undisturbed
 
 
 class AwayEvaluator(FormulaEvaluator):
@@ -323,9 +335,9 @@ class AbsentStore:
     release = partialmethod(_ask, "release")
 
 
-def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(store: Store) -> None:
-    whole = queue(store)
-    run(store, FormulaEvaluator())
+def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(
+    store: Store, undisturbed: list[Bits]
+) -> None:
     job_id = queue(store)
     evaluator = FormulaEvaluator()
     absent = AbsentStore(
@@ -335,7 +347,7 @@ def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(stor
     assert job.state is JobState.SUCCEEDED
     assert absent.refused.count("commit") == 3
     assert evaluator.calls == SPEC.iterations
-    assert history(store, job_id) == history(store, whole)
+    assert history(store, job_id) == undisturbed
 
 
 def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_longer_than_the_lease(
@@ -475,11 +487,9 @@ def test_recorded_designs_are_what_was_evaluated(store: Store) -> None:
 
 
 def test_a_change_of_priority_reaches_the_workers_and_changes_no_bit(
-    standing: StandingStore,
+    standing: StandingStore, undisturbed: list[Bits]
 ) -> None:
     store = standing.store
-    whole = queue(store)
-    run(store, FormulaEvaluator())
     job, _ = store.create_job(SPEC, priority=-1)
     given: list[float] = []
 
@@ -505,7 +515,7 @@ def test_a_change_of_priority_reaches_the_workers_and_changes_no_bit(
     ended = run(store, evaluator, on_commit=prioritize, lease_seconds=BRISK)
     assert ended.state is JobState.SUCCEEDED
     assert (given[0], given[-1]) == (0.5, 16.0)
-    assert history(store, job.id) == history(store, whole)
+    assert history(store, job.id) == undisturbed
 
 
 def test_a_drained_job_does_not_wait_for_workers_out_of_reach(store: Store) -> None:

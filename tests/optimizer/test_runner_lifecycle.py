@@ -19,14 +19,14 @@ from tests.optimizer.formula import SPEC, FormulaEvaluator, queue, run
 
 
 def test_a_runner_runs_jobs_side_by_side_to_the_bits_of_jobs_run_alone(store: Store) -> None:
-    specs = [SPEC, SPEC.model_copy(update={"seed": 12}), SPEC.model_copy(update={"iterations": 9})]
+    specs = [SPEC, SPEC.model_copy(update={"seed": 12, "iterations": 9})]
     alone = []
     for spec in specs:
         job_id = queue(store, spec)
         run(store, FormulaEvaluator())
         alone.append(history(store, job_id))
     together = [queue(store, spec) for spec in specs]
-    runner = Runner(store, FormulaEvaluator(), concurrency=3, poll_seconds=0.01)
+    runner = Runner(store, FormulaEvaluator(), concurrency=2, poll_seconds=0.01)
     runner.start()
     eventually(lambda: all(store.job(j).state is JobState.SUCCEEDED for j in together))
     runner.stop()

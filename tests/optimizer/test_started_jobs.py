@@ -60,7 +60,7 @@ def test_start_designs_are_judged_first_and_count_as_budget(store: Store) -> Non
 
 
 def test_the_best_of_a_start_is_never_lost(store: Store) -> None:
-    earlier = run(store, spec((), iterations=20))
+    earlier = run(store, spec((), iterations=12))
     for method in ("pso", "random"):
         optimizer = {"name": method, "particles": 4}
         later = run(store, spec({"jobs": [earlier.id]}, seed=99, optimizer=optimizer))

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -55,7 +55,6 @@ def test_a_state_of_another_swarm_size_is_refused() -> None:
     limit=st.floats(0.01, 1.0),
     social=st.floats(0.0, 10.0),
 )
-@settings(max_examples=60, deadline=None)
 def test_no_settings_and_no_fitness_lead_out_of_the_box_or_off_the_bits(
     seed: int, particles: int, fitness: list[float], bounds: str, limit: float, social: float
 ) -> None:

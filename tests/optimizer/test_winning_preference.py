@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.preferences import PreferenceFitView, preference_for
@@ -41,12 +41,11 @@ def history(rows: int, seed: int, scenarios: int = 2) -> np.ndarray:
     owner=st.sampled_from(["A", "B", "C"]),
     seed=st.integers(0, 1000),
 )
-@settings(max_examples=25, deadline=None)
 def test_every_winner_under_some_preference_is_found_to_win(
     exponent: list[float], owner: str, seed: int
 ) -> None:
     own = PREFERENCES[owner]  # type: ignore[index]
-    columns = columns_of(history(60, seed), own=own)
+    columns = columns_of(history(30, seed), own=own)
     asked = Preference(bias=own.bias, exponent=tuple(exponent))
     row = int(fitness_by(columns, asked).argmin())
     best = fits_of(columns, row, own)[0]

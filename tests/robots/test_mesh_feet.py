@@ -102,6 +102,7 @@ def test_simple_shapes_go_before_meshes(init: Init) -> None:
     assert robot.legs[0].lengths[2] == pytest.approx(0.17)
 
 
+@pytest.mark.variants("missing", "broken")
 @pytest.mark.parametrize("content", [None, "no mesh", ""], ids=["missing", "broken", "empty"])
 def test_without_its_mesh_a_shank_is_a_rod_and_the_remedy_is_named(
     content: str | None, init: Init, tmp_path: Path

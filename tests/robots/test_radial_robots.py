@@ -43,7 +43,7 @@ def made(layout: str, limit: float = 0.8) -> tuple[Proposal, Robot]:
     return proposal, parse_robot(proposal.toml, proposal.urdf)
 
 
-@pytest.mark.variants("three-0.8", "six-0.8", "five-1.57")
+@pytest.mark.variants("six-0.8", "five-1.57")
 @pytest.mark.parametrize("limit", [0.8, 1.57])
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_leg_stands_where_it_points_and_both_walks_are_in_reach(
@@ -70,7 +70,7 @@ def test_neighbours_of_a_round_hexapod_step_in_turns(layout: str) -> None:
     assert phases in ([0.0, 0.5] * 3, [0.5, 0.0] * 3)
 
 
-@pytest.mark.variants
+@pytest.mark.variants("three")
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
     proposal, _ = made(layout)

@@ -18,22 +18,21 @@ from tests.robots.test_proposal import ARM, dog
 
 
 def test_init_makes_the_requested_actuators(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "dog.urdf").write_text(dog(), encoding="utf-8")
 
-    def made(*options: str) -> tuple[str, str]:
-        output = tmp_path / "-".join(["made", *options[1:]])
-        command = ["robot", "init", str(tmp_path / "dog.urdf"), "--output", str(output), *options]
-        assert run(command) == 0
-        job = json.loads((output / "job.json").read_text(encoding="utf-8"))
-        return (output / "robot.toml").read_text(encoding="utf-8"), job["controller"]
+    command = ["robot", "init", str(tmp_path / "dog.urdf"), "--output", str(tmp_path / "dog")]
 
-    dc, torque, auto = made("--actuator", "dc"), made("--actuator", "torque"), made()
+    def made(folder: Path) -> tuple[str, str]:
+        job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
+        return (folder / "robot.toml").read_text(encoding="utf-8"), job["controller"]
+
+    assert run([*command, "--actuator", "dc"]) == 0
+    dc, auto = made(tmp_path / "dog"), made(folder)
     assert "[motors." in dc[0] and dc[1] == "pid"
-    assert 'kind = "torque"' in torque[0] and torque[1] == "joint-pd"
-    assert auto == torque
-    command = ["robot", "init", str(tmp_path / "dog.urdf"), "--output", str(tmp_path / "no")]
+    assert 'kind = "torque"' in auto[0] and auto[1] == "joint-pd"
+    command[-1] = str(tmp_path / "no")
     assert run([*command, "--actuator", "hydraulic"]) == 2
     assert "auto, dc, torque" in capsys.readouterr().err
 

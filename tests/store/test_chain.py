@@ -163,10 +163,9 @@ def execute(database_url: str, statement: str, **values: object) -> None:
 
 
 @pytest.mark.variants(
-    *("*-a number of a design", "sqlite-a status", "sqlite-what was asked", "sqlite-a digest"),
-    *("sqlite-the digest of a state", "sqlite-no digest", "sqlite-an order of designs"),
-    *("sqlite-a design too few", "sqlite-a part of a number", "sqlite-a summary"),
-    *("sqlite-no status", "sqlite-the job's spec", "sqlite-the job's provenance"),
+    *("*-a number of a design", "sqlite-a status", "sqlite-what was asked", "sqlite-no digest"),
+    *("sqlite-the digest of a state", "sqlite-an order of designs", "sqlite-a design too few"),
+    *("sqlite-a part of a number", "sqlite-a summary", "sqlite-the job's spec"),
 )
 @pytest.mark.parametrize(("statement", "index"), TAMPERED.values(), ids=TAMPERED)
 def test_what_was_changed_is_found_and_its_iteration_named(

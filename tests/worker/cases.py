@@ -5,16 +5,18 @@ from __future__ import annotations
 import os
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.kernel import Precision
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
+from tests.worker.requests import request
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,14 @@ class Slow(InPlaceOfWalk):
     def run(self, designs: NDArray[np.float64]) -> Outcome:
         time.sleep(self.seconds)
         return self.walk.run(designs)
+
+
+def slow(count: int, seconds: float, job_id: str = "job") -> EvaluationRequest:
+    """A request with a task for each design, that takes so long."""
+    wanted = request(count, job_id=job_id)
+    walk = wanted.cases[0]
+    assert isinstance(walk, Walk)
+    return replace(wanted, cases=(Slow(walk, seconds),))
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from gaitswarm.services.runtime import AutoEvaluator, open_evaluator
 from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator, RaySession, open_ray
 from tests.examples.processes import eventually
+from tests.worker.cases import slow
 from tests.worker.conftest import LocalRay
 from tests.worker.requests import bits, never, request, walked_at_once
 
@@ -108,7 +109,7 @@ def test_ray_takes_over_from_threads_to_the_same_bits(
 def test_closing_ends_requests_in_threads(auto: AutoEvaluator) -> None:
     threading.Timer(0.2, auto.close).start()
     with pytest.raises(EvaluatorUnavailable, match="closed"):
-        auto.evaluate(request(500), never)
+        auto.evaluate(slow(400, 0.1), never)
 
 
 def test_without_an_address_only_servers_and_runners_start_ray() -> None:

@@ -11,11 +11,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
-from gaitswarm.services.optimizer.run.evaluator import (
-    EvaluationRequest,
-    EvaluationStopped,
-    Evaluator,
-)
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from gaitswarm.services.worker.dispatch import InProcessEvaluator
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Walk
@@ -25,7 +21,7 @@ from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.robot import RobotVariant
 from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import short_walk
-from tests.worker.cases import Slow
+from tests.worker.cases import slow
 from tests.worker.requests import SCENARIOS, bits, never, request, walked_at_once
 
 pytestmark = pytest.mark.slow
@@ -80,14 +76,6 @@ def test_walks_of_another_provenance_are_refused_in_words(evaluator: Evaluator) 
     ):
         evaluator.evaluate(wanted, never)
     assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
-
-
-def slow(count: int, seconds: float, job_id: str = "job") -> EvaluationRequest:
-    """A task for each design, that takes so long."""
-    wanted = request(count, job_id=job_id)
-    walk = wanted.cases[0]
-    assert isinstance(walk, Walk)
-    return replace(wanted, cases=(Slow(walk, seconds),))
 
 
 def test_work_is_dropped_when_it_is_stopped(evaluator: Evaluator) -> None:
@@ -211,7 +199,7 @@ def test_closing_ends_requests_under_way() -> None:
     evaluator = InProcessEvaluator(1)
     threading.Timer(0.2, evaluator.close).start()
     with pytest.raises(EvaluatorUnavailable):
-        evaluator.evaluate(request(500), never)
+        evaluator.evaluate(slow(400, 0.1), never)
 
 
 def test_no_processors_are_refused() -> None:

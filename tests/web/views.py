@@ -16,9 +16,9 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
     "jobs": {
         "jobs": "/jobs",
         "new-job": "/jobs/new",
-        "new-job-in-full": "/jobs/new?clone={job}",
     },
     "other forms and comparison": {
+        "new-job-in-full": "/jobs/new?clone={job}",
         "new-identification": "/jobs/new?kind=identification",
         "new-calibration": "/jobs/new?kind=calibration",
         "custom-robot": "/jobs/new?robot=own",

@@ -14,7 +14,7 @@ from playwright.sync_api import expect
 
 from tests.examples.meshes import DAE, OBJ, tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.robots.test_obstacles import LIMITS, longer
 from tests.robots.test_proposal import dog
 from tests.web.pixels import painted
@@ -84,8 +84,10 @@ def test_meshes_of_a_custom_robot_are_drawn_and_can_be_hidden(
 
 
 def test_a_urdf_is_simulated_and_submitted(
-    server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
+
     def file(name: str, text: str) -> Path:
         (tmp_path / name).write_text(text, encoding="utf-8")
         return tmp_path / name
@@ -145,8 +147,9 @@ def test_a_urdf_is_simulated_and_submitted(
 
 
 def test_a_robot_with_surplus_joints_and_named_servos_is_made_and_submitted(
-    server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
     (tmp_path / "dog.urdf").write_text(UNEVEN, encoding="utf-8")
     page = visit(server.url, allowed="422").go("/jobs/new")
     page.get_by_role("button", name="My robot").click()

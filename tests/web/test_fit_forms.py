@@ -15,7 +15,7 @@ from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.scenario import find_scenario
 from scripts.measured_logs import format_measured_log
 from tests.examples.paths import QUADRUPED
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.examples.walks import PUBLISHED_A
 from tests.web.test_views import findings
 from tests.web.visit import Visit
@@ -53,10 +53,21 @@ def submitted(page: Page) -> str:
 
 
 def test_a_log_is_uploaded_and_an_identification_submitted(
-    server: ServerProcess, log: Path, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], log: Path, tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
     page = visit(server.url, allowed="422").go("/jobs/new")
     page.get_by_role("link", name="an identification from measured walks").click()
+    # Errors of a log are shown at its field.
+    page.get_by_role("button", name="Upload the log").click()
+    expect(page.get_by_label("Log")).to_have_accessible_description("choose a file first")
+    lines = log.read_text(encoding="utf-8").splitlines()
+    broken = tmp_path / "broken.csv"
+    broken.write_text("\n".join([*lines[:9], "warp" + lines[9], *lines[10:]]), encoding="utf-8")
+    upload(page, broken)
+    message = re.compile(r"line 10, column 'time \[s\]': 'warp.*' is not a number")
+    expect(page.get_by_label("Log")).to_have_accessible_description(message)
+
     page.get_by_label("Cycles").fill("2")
     upload(page, log)
     read = page.get_by_role("region", name="Log summary")
@@ -111,8 +122,9 @@ def test_a_log_is_uploaded_and_an_identification_submitted(
 
 
 def test_a_calibration_has_targets_of_a_log_and_typed_ones(
-    server: ServerProcess, log: Path, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], log: Path, visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
     page = visit(server.url, allowed="422").go("/jobs/new?kind=calibration")
     page.get_by_label("Cycles").fill("1")
     upload(page, log)
@@ -140,8 +152,9 @@ def test_a_calibration_has_targets_of_a_log_and_typed_ones(
 
 
 def test_a_calibration_has_targets_of_a_table_without_a_log(
-    server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
     page = visit(server.url, allowed="422").go("/jobs/new?kind=calibration")
     table = tmp_path / "targets.csv"
     table.write_text(
@@ -183,20 +196,6 @@ def test_targets_of_a_log_are_accessible_at_every_width(
     upload(page, log)
     expect(page.get_by_label("value of target 1")).not_to_have_value("")
     assert findings(page) == {}
-
-
-def test_errors_of_a_log_are_shown_at_its_field(
-    server: ServerProcess, log: Path, tmp_path: Path, visit: Callable[..., Visit]
-) -> None:
-    page = visit(server.url, allowed="422").go("/jobs/new?kind=identification")
-    page.get_by_role("button", name="Upload the log").click()
-    expect(page.get_by_label("Log")).to_have_accessible_description("choose a file first")
-    lines = log.read_text(encoding="utf-8").splitlines()
-    broken = tmp_path / "broken.csv"
-    broken.write_text("\n".join([*lines[:9], "warp" + lines[9], *lines[10:]]), encoding="utf-8")
-    upload(page, broken)
-    message = re.compile(r"line 10, column 'time \[s\]': 'warp.*' is not a number")
-    expect(page.get_by_label("Log")).to_have_accessible_description(message)
 
 
 @pytest.mark.thorough("test_a_log_is_uploaded_and_an_identification_submitted")

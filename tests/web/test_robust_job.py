@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.job_page import choose
 from tests.web.test_job import fill_in, submitted
 from tests.web.visit import Visit
@@ -18,8 +18,9 @@ pytestmark = pytest.mark.slow
 
 
 def test_a_robust_job_is_configured_with_its_cost_in_view(
-    server: ServerProcess, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
     fill_in(page, "robust", iterations=2)
     walks = page.locator("[data-walks]")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import choose, expect_state
 from tests.web.test_job import fill_in, submitted
@@ -24,8 +24,9 @@ def setting(page: Page, name: str) -> object:
 
 
 def test_a_method_is_configured_in_the_form_and_shown_with_its_job(
-    server: ServerProcess, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
+    server = start_server()
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
     fill_in(page, "differential evolution", iterations=2)
     expect(page.get_by_label(re.compile("^Sigma"))).to_have_value("0.25")
@@ -78,6 +79,15 @@ def test_the_budget_of_a_job_with_small_iterations_is_counted_in_designs(
     expect(page.get_by_text("30 of 30 evaluations are done")).to_be_visible()
     expect(page.get_by_label("Evaluations in total")).to_have_attribute("min", "31")
     page.get_by_role("button", name="Back").click()
+    # A fork begins at its end, with as large a budget again.
+    choose(page, "Fork…")
+    expect(page.get_by_label("First new iteration")).to_have_value(str(job["iterations"]))
+    expect(page.get_by_label("Evaluations in total")).to_have_value("60")
+    page.get_by_role("button", name="Fork the job").click()
+    expect(page).not_to_have_url(re.compile(job_id))
+    fork = server.wait_for(page.url.rpartition("/")[2], "succeeded")
+    assert fork["evaluations"] == 60
+    page.go_back()
 
     page.get_by_role("link", name="Details", exact=True).click()
     page.get_by_role("link", name="Iterations", exact=True).click()

@@ -25,15 +25,6 @@ SHIFTS = """() => new Promise((resolve) => {
 """Cumulative layout shift since the page was opened."""
 
 
-def test_nothing_moves_while_the_surface_loads(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
-    page = visit(server.url).go("/controller")
-    expect(page.locator("[data-surface] canvas")).to_be_visible()
-    expect(page.get_by_role("table", name="Design values")).to_be_visible()
-    assert page.evaluate(SHIFTS) < 0.05
-
-
 def test_the_surface_is_drawn_with_the_values_of_the_api(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
@@ -51,11 +42,14 @@ def test_the_surface_is_drawn_with_the_values_of_the_api(
     expect(drawn).to_have_attribute("data-cells", str(inference.size))
     for name, value in (("min", inference.min()), ("max", inference.max())):
         assert float(drawn.get_attribute(f"data-{name}") or "nan") == pytest.approx(value)
+    # Nothing moves while the surface loads.
+    expect(page.get_by_role("table", name="Design values")).to_be_visible()
+    assert page.evaluate(SHIFTS) < 0.05
     painted(drawn.locator("canvas"), colourful(200))
 
     # The camera of the link: rotating back and forth restores it.
     page.goto("/controller?published=A&camera=-1.5:-2.5:1.5:0:0:-0.04")
-    painted(drawn.locator("canvas"), colourful(200))
+    expect(drawn.locator("canvas")).to_be_visible()
     drawn.press("ArrowLeft")
     expect(page).not_to_have_url(re.compile("camera=-1.5"))
     drawn.press("ArrowRight")

@@ -126,12 +126,14 @@ def on_rough_ground(route: Route, *, with_heights: bool) -> None:
     route.fulfill(body=struct.pack("<I", len(text)) + text + numbers.tobytes())
 
 
-def test_uneven_ground_is_drawn(server: ServerProcess, visit: Callable[..., Visit]) -> None:
+def test_uneven_ground_is_drawn(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
     pictures = []
+    visited = visit(server.url, viewport={"width": 480, "height": 480})
     for with_heights in (True, False):
-        visited = visit(server.url)
         visited.page.route("**/v1/replays", partial(on_rough_ground, with_heights=with_heights))
-        page = visited.go("/walk?published=A&scenario=normal-fast")
+        page = visited.go(f"/walk?job={finished_job}&scenario=short")
         pictures.append(painted(player(page).locator("canvas"), colourful(200)))
         visited.page.unroute("**/v1/replays")
     uneven, flat = pictures

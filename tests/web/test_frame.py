@@ -191,7 +191,7 @@ def test_the_zoom_of_a_recreated_chart_can_be_reset(
     expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
 
 
-@pytest.mark.thorough("test_filters_order_and_search_are_in_the_address")
+@pytest.mark.thorough("test_paging_and_selection_reach_every_job")
 def test_a_new_order_starts_on_the_first_page(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

@@ -9,8 +9,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.servers import Server, ServerProcess
-from tests.web.conftest import SMALL_JOB
+from tests.examples.servers import Server
 from tests.web.job_page import choose, command
 from tests.web.visit import Visit
 
@@ -37,33 +36,29 @@ def respond_late(route: Route) -> None:
 
 
 def test_a_deleted_job_is_restored_from_the_list_and_from_its_page(
-    server: ServerProcess, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
-    job_id = server.submit(SMALL_JOB | {"name": "to be deleted"})
-    job = server.wait_for(job_id, "succeeded")
-    forked = server.client.post(
-        f"/v1/jobs/{job_id}/fork", json={"from_iteration": 1, "name": "fork"}
-    )
-    fork = server.wait_for(forked.json()["id"], "succeeded")
+    server = start_server()
+    job_id, other = (server.submit(SMALL_SPEC | {"name": name}) for name in ("deleted", "other"))
+    server.client.post(f"/v1/jobs/{job_id}/cancel").raise_for_status()
     page = visit(server.url, allowed="status of 404").go(f"/jobs/{job_id}")
 
     page.route(f"**/v1/jobs/{job_id}", respond_late)
     choose(page, "Delete")
     expect(page).to_have_url(re.compile(r"/$"))
-    expect(page.locator(f"a[href='/jobs/{fork['id']}']")).to_be_visible()
-    expect(page.get_by_role("link", name="to be deleted")).to_have_count(0)
+    expect(page.locator(f"a[href='/jobs/{other}']")).to_be_visible()
+    listed = page.get_by_role("link", name="deleted", exact=True)
+    expect(listed).to_have_count(0)
     assert server.client.get(f"/v1/jobs/{job_id}").status_code == 404
-    left = server.client.get(f"/v1/jobs/{fork['id']}/iterations").json()["items"]
-    assert len(left) == fork["iterations"]
     expect(page.get_by_text("1 job deleted. They can be restored for 24 hours.")).to_be_visible()
     click_button(page, "Undo")
-    expect(page.get_by_role("link", name="to be deleted")).to_be_visible()
-    assert server.job(job_id)["best"] == job["best"]
+    expect(listed).to_be_visible()
+    assert server.job(job_id)["state"] == "cancelled"
 
     server.client.delete(f"/v1/jobs/{job_id}")
     page.goto(f"/jobs/{job_id}")
     click_button(page, "Restore the deleted job")
-    expect(page.get_by_role("heading", name="to be deleted")).to_be_visible()
+    expect(page.get_by_role("heading", name="deleted")).to_be_visible()
 
 
 def test_active_and_protected_jobs_cannot_be_deleted(

@@ -10,8 +10,6 @@ from playwright.sync_api import expect
 
 import gaitswarm
 from tests.examples.servers import ServerProcess
-from tests.web.conftest import SMALL_JOB
-from tests.web.job_page import choose
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -36,10 +34,13 @@ def test_a_fork_and_its_parent_link_to_each_other(
     budget.fill("24")
     dialog.get_by_label("Name").fill("another way")
     dialog.get_by_label("Method").select_option("random")
+    dialog.get_by_text("Weights of the scenarios, all 1").click()
+    dialog.get_by_label("Weight of loaded").fill("2")
     submit.click()
     expect(page).not_to_have_url(re.compile(finished_job))
     fork_id = page.url.rpartition("/")[2]
-    server.wait_for(fork_id, "succeeded")
+    fork = server.wait_for(fork_id, "succeeded")
+    assert fork["spec"]["scenario_weights"] == {"loaded": 2.0}
     page.goto(f"{server.url}/jobs/{fork_id}/summary")
     parent = page.locator(f"[data-parent='{finished_job}']")
     expect(parent).to_contain_text("with another optimizer")
@@ -57,28 +58,7 @@ def test_a_fork_and_its_parent_link_to_each_other(
     expect(row).to_contain_text(f"fork of {finished_job}")
 
 
-def test_a_job_of_many_small_iterations_can_be_forked_at_its_end_with_other_weights(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
-    small = {"name": "cma-es", "particles": 5, "population": 4}
-    job_id = server.submit(SMALL_JOB | {"optimizer": small, "iterations": 3})
-    job = server.wait_for(job_id, "succeeded")
-    assert job["iterations"] > job["iterations_planned"]
-    page = visit(server.url).go(f"/jobs/{job_id}")
-    choose(page, "Fork…")
-    dialog = page.get_by_role("dialog", name="Fork the job")
-    expect(dialog.get_by_label("First new iteration")).to_have_value(str(job["iterations"]))
-    expect(dialog.get_by_label("Evaluations in total")).to_have_value("30")
-    dialog.get_by_text("Weights of the scenarios, all 1").click()
-    dialog.get_by_label("Weight of loaded").fill("2")
-    dialog.get_by_role("button", name="Fork the job").click()
-    expect(page).not_to_have_url(re.compile(job_id))
-    fork = server.wait_for(page.url.rpartition("/")[2], "succeeded")
-    assert fork["evaluations"] == 30
-    assert fork["spec"]["scenario_weights"] == {"loaded": 2.0}
-
-
-def test_evidence_is_downloaded_and_verified(
+def test_history_and_downloaded_evidence_are_verified(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/reproduce")
@@ -88,11 +68,6 @@ def test_evidence_is_downloaded_and_verified(
     assert download.value.suggested_filename == f"{finished_job}.zip"
     assert gaitswarm.verify(download.value.path(), replay=1).verified
 
-
-def test_the_history_is_verified(
-    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
-) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}/reproduce")
     card = page.get_by_role("region", name="Provenance")
     with gaitswarm.connect(server.url) as jobs:
         head = jobs.job(finished_job).head

@@ -82,7 +82,7 @@ def test_ranks_are_shown_by_cell_and_axes_may_be_objectives(
     expect(cells.first).to_contain_text(" to ")
 
 
-@pytest.mark.thorough("test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front")
+@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_chosen_from_and_listed")
 def test_a_clicked_design_is_highlighted_in_the_table(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -30,7 +30,7 @@ def proxy(server: ServerProcess) -> Iterator[CuttableProxy]:
     proxy.close()
 
 
-def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap(
+def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap_or_errors(
     server: ServerProcess, proxy: CuttableProxy, visit: Callable[..., Visit]
 ) -> None:
     job_id = server.submit(SMALL_JOB | {"iterations": 5000})
@@ -46,9 +46,16 @@ def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap(
     while server.job(job_id)["iterations"] < last + 10:
         page.wait_for_timeout(50)
     assert shown_iteration(page) == last
+    # Commands fail, and so does code that was not loaded before.
+    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_text("The command failed.")).to_be_visible()
+    page.get_by_role("link", name="Explore").click()
+    expect(page.get_by_text(re.compile("^Could not load"))).to_be_visible()
 
     proxy.mend()
 
+    expect(page.locator("[data-selected]")).to_be_visible()
+    expect(page.get_by_role("alert")).to_have_count(0)
     wait_for_iteration(page, last + 12)
     expect(job_element(page)).to_have_attribute("data-stream", "open")
     expect(page.get_by_text("stale since")).to_be_hidden()
@@ -60,27 +67,6 @@ def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap(
     page.get_by_role("link", name="Details", exact=True).click()
     page.get_by_role("link", name="Iterations", exact=True).click()
     expect(page.get_by_text(f"{committed} of {committed}", exact=True)).to_be_visible()
-
-
-def test_failures_without_a_connection_are_retried_and_cleared(
-    server: ServerProcess, proxy: CuttableProxy, visit: Callable[..., Visit]
-) -> None:
-    job_id = server.submit(SMALL_JOB | {"iterations": 5000})
-    page = visit(proxy.url, allowed=BROKEN).go(f"/jobs/{job_id}")
-    wait_for_iteration(page, 2)
-    proxy.cut()
-    expect(job_element(page)).to_have_attribute("data-stream", "stale")
-    page.get_by_role("button", name="Pause").click()
-    expect(page.get_by_text("The command failed.")).to_be_visible()
-    # The code of this section was not loaded before.
-    page.get_by_role("link", name="Explore").click()
-    expect(page.get_by_text(re.compile("^Could not load"))).to_be_visible()
-
-    proxy.mend()
-
-    expect(page.locator("[data-selected]")).to_be_visible()
-    expect(page.get_by_role("alert")).to_have_count(0)
-    server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
 def test_code_that_is_missing_after_a_reload_as_well_is_an_error(
@@ -97,14 +83,6 @@ def test_code_that_is_missing_after_a_reload_as_well_is_an_error(
     expect(page.get_by_text(re.compile("^Could not load the code"))).to_be_visible()
     page.wait_for_timeout(3000)
     assert len(loads) == 1
-
-
-def test_the_page_of_a_missing_job_leads_on(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
-    page = visit(server.url, allowed="status of 404").go("/jobs/none")
-    expect(page.get_by_role("heading", name="Job not found")).to_be_visible()
-    expect(page.get_by_role("main").get_by_role("link", name="list of jobs")).to_be_visible()
 
 
 def test_a_failed_job_is_shown_with_its_reason(

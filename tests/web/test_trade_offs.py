@@ -38,7 +38,7 @@ def table(page: Page, name: str) -> Locator:
     return page.get_by_role("table", name=name)
 
 
-def test_the_front_is_drawn_over_any_two_objectives_and_listed(
+def test_the_front_is_drawn_over_any_two_objectives_chosen_from_and_listed(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     front = front_of(server, finished_job)
@@ -56,6 +56,23 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed(
         "aria-label", re.compile("by energy and acceleration$")
     )
 
+    # A click in the chart chooses the nearest design of the front.
+    chart = page.get_by_role("img", name=SCATTER)
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert box is not None
+    selected = page.locator("[data-selected-design]")
+    expect(selected).to_have_attribute("data-selected-design", "")
+    # There is a design somewhere along these lines.
+    for share, step in product((0.3, 0.5, 0.7), range(8, 60)):
+        page.mouse.click(box["x"] + box["width"] * step / 60, box["y"] + box["height"] * share)
+        if selected.get_attribute("data-selected-design") != "":
+            break
+    expect(selected, "no click selected a design").not_to_have_attribute("data-selected-design", "")
+    assert selected.get_attribute("data-selected-design") in {
+        place(design) for design in front["designs"]
+    }
+
     page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
     rows = table(page, "Designs of the front").locator("tbody tr")
     expect(rows).to_have_count(min(20, len(front["designs"])))
@@ -71,7 +88,7 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed(
     expect(page).to_have_url(re.compile(rf"/walk\?job={finished_job}&iteration="))
 
 
-@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_and_listed")
+@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_chosen_from_and_listed")
 def test_published_designs_are_simulated_on_request_and_listed(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -86,7 +103,7 @@ def test_published_designs_are_simulated_on_request_and_listed(
     expect(rows).to_have_text(["published A", "published B", "published C"])
 
 
-@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_and_listed")
+@pytest.mark.thorough("test_the_front_is_drawn_over_any_two_objectives_chosen_from_and_listed")
 def test_winners_by_preference_and_the_hypervolume_are_shown(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -132,28 +149,6 @@ def test_the_preference_for_a_design_ranks_the_history_and_starts_a_job(
     expect(
         page.get_by_role("group", name="Preference").get_by_role("button", name="custom")
     ).to_have_attribute("aria-pressed", "true")
-
-
-def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
-    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
-) -> None:
-    front = front_of(server, finished_job)
-    page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
-    chart = page.get_by_role("img", name=SCATTER)
-    chart.scroll_into_view_if_needed()
-    box = chart.bounding_box()
-    assert box is not None
-    selected = page.locator("[data-selected-design]")
-    expect(selected).to_have_attribute("data-selected-design", "")
-    # There is a design somewhere along these lines.
-    for share, step in product((0.3, 0.5, 0.7), range(8, 60)):
-        page.mouse.click(box["x"] + box["width"] * step / 60, box["y"] + box["height"] * share)
-        if selected.get_attribute("data-selected-design") != "":
-            break
-    expect(selected, "no click selected a design").not_to_have_attribute("data-selected-design", "")
-    assert selected.get_attribute("data-selected-design") in {
-        place(design) for design in front["designs"]
-    }
 
 
 @pytest.mark.thorough("test_the_preference_for_a_design_ranks_the_history_and_starts_a_job")

@@ -6,7 +6,6 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import httpx2
-import pytest
 
 from gaitswarm.jobs.operation import OPERATIONS
 from gaitswarm.services.optimizer.jobs.iteration import EvaluationColumns
@@ -34,21 +33,18 @@ class Waiting(JobService):
         return super().columns(job)
 
 
-@pytest.mark.parametrize(
-    "question", ["distribution", "preference-for?iteration=0&particle=1", "importance"]
-)
 def test_analyses_wait_for_capacity_and_are_rejected_when_the_queue_is_full(
-    serve: Serve, service: JobService, job: Job, commit: Commit, question: str
+    serve: Serve, service: JobService, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
     waiting = Waiting(service.store)
     waiting.begun.clear()
     waiting.go_on.clear()
     server = serve(waiting, api_compute_workers=1, api_compute_queue=1)
-    path = f"{server.url}/v1/jobs/{job.id}/{question}"
+    path = f"{server.url}/v1/jobs/{job.id}/distribution"
 
     def ask() -> int:
-        return httpx2.get(path, timeout=20.0).status_code
+        return httpx2.get(path, timeout=20.0, verify=False).status_code
 
     with ThreadPoolExecutor(2) as threads:
         first = threads.submit(ask)
@@ -59,7 +55,7 @@ def test_analyses_wait_for_capacity_and_are_rejected_when_the_queue_is_full(
             for _ in range(200):
                 # Until the second one has come to wait, this one takes its place.
                 try:
-                    refused = httpx2.get(path, timeout=0.2)
+                    refused = httpx2.get(path, timeout=0.2, verify=False)
                     break
                 except httpx2.ReadTimeout:
                     continue

@@ -23,7 +23,7 @@ SPEC: dict[str, Any] = {
     ],
     "variables": ["robot", "contact_law"],
     "fixed": {"energy": "positive"},
-    "optimizer": {"particles": 6},
+    "optimizer": {"particles": 3},
     "iterations": 2,
 }
 
@@ -31,7 +31,7 @@ SPEC: dict[str, Any] = {
 def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: Store) -> None:
     estimate = client.post("/v1/estimates", json=SPEC)
     assert estimate.status_code == 200
-    assert estimate.json()["walks"] == 24
+    assert estimate.json()["walks"] == 12
     answer = client.post("/v1/jobs", json=SPEC)
     assert answer.status_code == 202
     path = f"/v1/jobs/{answer.json()['id']}"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import copy
+import json
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
-from gaitswarm.api.app import create_app
-from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.settings import Settings
+from gaitswarm.api.document import document
 
 
 def api_document() -> dict[str, Any]:
@@ -18,4 +17,4 @@ def api_document() -> dict[str, Any]:
 
 @cache
 def _document() -> dict[str, Any]:
-    return create_app(cast(JobService, None), settings=Settings()).openapi()
+    return json.loads(document())

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.examples.forked import run_forked
+from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
 from tests.examples.plugins import install, installed
 from tests.examples.processes import python
@@ -42,9 +42,8 @@ def test_its_package_keeps_to_the_contracts(site: Path, path: dict[str, str]) ->
     assert " passed" in done.stdout
 
 
-def test_its_commands_run(
-    site: Path, path: dict[str, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("path")
+def test_its_commands_run(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(site)
     (block,) = re.findall(r"^```sh\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
     printed = ""
@@ -52,8 +51,8 @@ def test_its_commands_run(
         for line in block.splitlines():
             _, *words = shlex.split(line)
             extra = ["--evaluator", "in-process"] if words[0] == "optimize" else []
-            done = run_forked(*words, *extra, environment=path)
-            assert done.returncode == 0, done.stderr
-            printed += done.stdout
+            done = run_command(*words, *extra)
+            assert done.code == 0, done.err
+            printed += done.out
     assert "refused" not in printed
     assert all(name in printed for name in ("pd", "hill", "damped", "share"))

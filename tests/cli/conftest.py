@@ -33,8 +33,15 @@ def write_json(tmp_path: Path) -> WriteJson:
 
 
 @pytest.fixture
-def db(tmp_path: Path) -> Path:
-    return tmp_path / "jobs.db"
+def db(database: Path) -> Path:
+    """An empty database."""
+    return database
+
+
+@pytest.fixture
+def new_db(tmp_path: Path) -> Path:
+    """The path of a database that a command may create."""
+    return tmp_path / "new.db"
 
 
 @pytest.fixture

@@ -122,10 +122,12 @@ def test_an_accepted_change_is_recorded_from_its_iteration(
     assert "computed by from iteration 2" in said and now["robot_digest"][:8] in said
 
 
-def test_accept_changes_requires_resume(gaitswarm: Gaitswarm, small_spec: Path, db: Path) -> None:
-    refused = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--accept-changes")
+def test_accept_changes_requires_resume(
+    gaitswarm: Gaitswarm, small_spec: Path, new_db: Path
+) -> None:
+    refused = gaitswarm("optimize", "--spec", small_spec, "--db", new_db, "--accept-changes")
     assert refused.code == 2 and "accept-changes" in refused.err
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 def test_consent_reaches_a_job_in_a_database_and_on_a_server(

@@ -32,13 +32,13 @@ def test_commands_refuse_a_database_of_another_schema(gaitswarm: Gaitswarm, db: 
         assert "revision 0019, which this gaitswarm" in refused.err
 
 
-def test_a_missing_database_is_not_created(gaitswarm: Gaitswarm, db: Path) -> None:
-    assert gaitswarm("db", "upgrade", "--db", db).code == ExitCode.NOT_FOUND
-    assert not db.exists()
+def test_a_missing_database_is_not_created(gaitswarm: Gaitswarm, new_db: Path) -> None:
+    assert gaitswarm("db", "upgrade", "--db", new_db).code == ExitCode.NOT_FOUND
+    assert not new_db.exists()
 
 
 def test_a_backup_is_made_and_restored_and_overwrites_only_by_force(
-    gaitswarm: Gaitswarm, finished: Finished, db: Path, tmp_path: Path
+    gaitswarm: Gaitswarm, finished: Finished, new_db: Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "backup.db"
     assert gaitswarm("db", "backup", file, "--db", finished.db).code == ExitCode.OK
@@ -46,11 +46,11 @@ def test_a_backup_is_made_and_restored_and_overwrites_only_by_force(
     assert again.code == ExitCode.CONFLICT and "--force" in again.err
     assert gaitswarm("db", "backup", file, "--force", "--db", finished.db).code == ExitCode.OK
 
-    assert gaitswarm("db", "restore", file, "--db", db).code == ExitCode.OK
-    assert gaitswarm("best", finished.id, "--db", db, "--json").json
-    again = gaitswarm("db", "restore", file, "--db", db)
+    assert gaitswarm("db", "restore", file, "--db", new_db).code == ExitCode.OK
+    assert gaitswarm("best", finished.id, "--db", new_db, "--json").json
+    again = gaitswarm("db", "restore", file, "--db", new_db)
     assert again.code == ExitCode.CONFLICT and "--force" in again.err
-    assert gaitswarm("db", "restore", file, "--force", "--db", db).code == ExitCode.OK
+    assert gaitswarm("db", "restore", file, "--force", "--db", new_db).code == ExitCode.OK
 
 
 def test_a_check_reports_findings_and_fails(gaitswarm: Gaitswarm, db: Path) -> None:

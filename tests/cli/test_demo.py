@@ -18,7 +18,7 @@ def test_both_jobs_of_the_demo_run(gaitswarm: Gaitswarm, tmp_path: Path) -> None
     commands = target.partition("\n\n")[0].replace("\\\n", " ")
     jobs = re.findall(r"\$\(BIN\)/gaitswarm (.+?)\s+\$\(DB_OPTION\)", commands)
     assert len(jobs) == 2
-    shorter = ["--iterations", "1", "--particles", "4", "--db", str(tmp_path / "demo.db")]
+    shorter = ["--iterations", "1", "--particles", "2", "--db", str(tmp_path / "demo.db")]
     for job in jobs:
         result = gaitswarm(*shlex.split(job), *shorter)
         assert result.code == 0, result.err

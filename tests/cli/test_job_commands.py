@@ -156,11 +156,11 @@ def test_a_server_that_does_not_answer_is_exit_code_5(gaitswarm: Gaitswarm) -> N
     assert "gaitswarm serve" in result.err
 
 
-def test_reading_a_missing_database_does_not_create_it(gaitswarm: Gaitswarm, db: Path) -> None:
-    result = gaitswarm("list", "--db", db)
+def test_reading_a_missing_database_does_not_create_it(gaitswarm: Gaitswarm, new_db: Path) -> None:
+    result = gaitswarm("list", "--db", new_db)
     assert result.code == 3
-    assert str(db) in result.err
-    assert not db.exists()
+    assert str(new_db) in result.err
+    assert not new_db.exists()
 
 
 def test_without_options_commands_share_the_database_of_the_user(
@@ -172,11 +172,11 @@ def test_without_options_commands_share_the_database_of_the_user(
 
 
 def test_the_environment_names_a_database_and_an_option_goes_before_it(
-    gaitswarm: Gaitswarm, finished: Finished, db: Path, monkeypatch: pytest.MonkeyPatch
+    gaitswarm: Gaitswarm, finished: Finished, new_db: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("GAITSWARM_DB", str(finished.db))
     assert [job["id"] for job in gaitswarm("list", "--json").json] == [finished.id]
-    assert gaitswarm("list", "--db", db).code == 3
+    assert gaitswarm("list", "--db", new_db).code == 3
 
 
 def test_a_job_is_on_a_server_or_in_a_database_not_both(gaitswarm: Gaitswarm, db: Path) -> None:

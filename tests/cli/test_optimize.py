@@ -77,13 +77,13 @@ def test_a_search_in_single_precision_reports_its_best_in_double_with_the_differ
 
 @pytest.mark.parametrize("command", ["optimize", "simulate"])
 def test_a_precision_that_does_not_exist_is_refused_by_name(
-    gaitswarm: Gaitswarm, command: str, db: Path
+    gaitswarm: Gaitswarm, command: str, new_db: Path
 ) -> None:
-    given = ("--db", db) if command == "optimize" else ("--design", "published:A")
+    given = ("--db", new_db) if command == "optimize" else ("--design", "published:A")
     refused = gaitswarm(command, *given, "--precision", "half")
     assert refused.code == 2
     assert "precision" in refused.err and "'single' or 'double'" in refused.err
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 @pytest.mark.variants("pi-7")
@@ -224,13 +224,15 @@ BAD_SPECS: dict[str, tuple[dict[str, Any], str]] = {
 
 @pytest.mark.parametrize(("change", "field"), BAD_SPECS.values(), ids=BAD_SPECS)
 def test_a_bad_spec_is_exit_code_2_that_names_the_field_and_leaves_nothing(
-    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, change: dict[str, Any], field: str
+    gaitswarm: Gaitswarm, write_json: WriteJson, new_db: Path, change: dict[str, Any], field: str
 ) -> None:
-    result = gaitswarm("optimize", "--spec", write_json(SMALL_SPEC | change), "--db", db, "--json")
+    result = gaitswarm(
+        "optimize", "--spec", write_json(SMALL_SPEC | change), "--db", new_db, "--json"
+    )
     assert result.code == 2
     assert field in result.err
     assert result.out == ""
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 BAD_FILES = {
@@ -245,15 +247,15 @@ BAD_FILES = {
 
 @pytest.mark.parametrize(("content", "why"), BAD_FILES.values(), ids=BAD_FILES)
 def test_an_invalid_spec_file_is_exit_code_2(
-    gaitswarm: Gaitswarm, tmp_path: Path, db: Path, content: bytes, why: str
+    gaitswarm: Gaitswarm, tmp_path: Path, new_db: Path, content: bytes, why: str
 ) -> None:
     path = tmp_path / "spec.json"
     path.write_bytes(content)
-    result = gaitswarm("optimize", "--spec", path, "--db", db)
+    result = gaitswarm("optimize", "--spec", path, "--db", new_db)
     assert result.code == 2
     assert result.err.startswith("gaitswarm: spec: ")
     assert why in result.err
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 def test_a_missing_spec_file_is_exit_code_2(gaitswarm: Gaitswarm, db: Path) -> None:
@@ -267,12 +269,12 @@ def test_a_missing_spec_file_is_exit_code_2(gaitswarm: Gaitswarm, db: Path) -> N
     [["--evaluator", "abacus"], ["--cpus", "0"], ["--iterations", "many"], ["--no-such-option"]],
 )
 def test_an_option_that_makes_no_sense_is_exit_code_2(
-    gaitswarm: Gaitswarm, small_spec: Path, db: Path, options: list[str]
+    gaitswarm: Gaitswarm, small_spec: Path, new_db: Path, options: list[str]
 ) -> None:
-    result = gaitswarm("optimize", "--spec", small_spec, "--db", db, *options)
+    result = gaitswarm("optimize", "--spec", small_spec, "--db", new_db, *options)
     assert result.code == 2
     assert options[0].removeprefix("--") in result.err
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 def test_a_missing_directory_is_exit_code_5_and_named(
@@ -343,13 +345,15 @@ def test_a_start_that_makes_no_sense_is_refused_with_its_place(
 
 
 def test_an_invalid_cluster_address_leaves_no_job_behind(
-    gaitswarm: Gaitswarm, db: Path, small_spec: Path
+    gaitswarm: Gaitswarm, new_db: Path, small_spec: Path
 ) -> None:
-    result = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")
+    result = gaitswarm(
+        "optimize", "--spec", small_spec, "--db", new_db, "--ray-address", "ray://x:1"
+    )
     assert (
         result.code == ExitCode.BAD_INPUT and "is not the address of a cluster's head" in result.err
     )
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 @pytest.mark.parametrize(

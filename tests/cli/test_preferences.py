@@ -18,7 +18,7 @@ def test_a_search_of_a_job_is_submitted_and_shows_what_each_preference_buys(
 ) -> None:
     db = tmp_path / "jobs.db"
     spec = tmp_path / "preferences.json"
-    spec.write_text(json.dumps(DOCUMENT))
+    spec.write_text(json.dumps(DOCUMENT | {"tuning": DOCUMENT["tuning"] | {"iterations": 1}}))
     ended = gaitswarm("optimize", "--spec", spec, "--db", db, "--json")
     assert ended.code == 0, ended.err
     shown = gaitswarm("preferences", ended.json["id"], "--db", db)

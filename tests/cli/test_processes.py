@@ -91,6 +91,7 @@ def _bits(gaitswarm: Gaitswarm, job_id: str, db: Path) -> Any:
     return [iteration["evaluations"] for iteration in history["iterations"]]
 
 
+@pytest.mark.variants("optimize-2-*", "runner-*")
 @pytest.mark.parametrize(
     ("command", "stop", "code"),
     [

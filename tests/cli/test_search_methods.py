@@ -79,12 +79,12 @@ def test_settings_are_laid_over_those_of_a_spec(
     ],
 )
 def test_wrong_settings_name_the_field_and_the_way_out(
-    gaitswarm: Gaitswarm, db: Path, options: list[str], said: str
+    gaitswarm: Gaitswarm, new_db: Path, options: list[str], said: str
 ) -> None:
-    refused = gaitswarm("submit", "--db", db, *options)
+    refused = gaitswarm("submit", "--db", new_db, *options)
     assert refused.code == 2
     assert said in refused.err
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 def test_auto_is_stored_as_the_selected_method(gaitswarm: Gaitswarm, db: Path) -> None:

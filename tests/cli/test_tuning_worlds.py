@@ -64,12 +64,12 @@ def test_a_job_in_worlds_is_run_reported_and_ranked(
     ],
 )
 def test_invalid_input_names_the_field(
-    gaitswarm: Gaitswarm, db: Path, options: list[str], said: str
+    gaitswarm: Gaitswarm, new_db: Path, options: list[str], said: str
 ) -> None:
-    refused = gaitswarm("submit", "--db", db, *options)
+    refused = gaitswarm("submit", "--db", new_db, *options)
     assert refused.code == 2
     assert said in refused.err
-    assert not db.exists()
+    assert not new_db.exists()
 
 
 def test_scenarios_are_weighed_by_name(gaitswarm: Gaitswarm, db: Path) -> None:

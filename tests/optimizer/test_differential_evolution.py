@@ -104,10 +104,15 @@ def test_no_trial_is_a_design_that_the_population_has() -> None:
 
 def test_a_converged_population_is_given_up_for_a_new_one() -> None:
     optimizer = search(LINE, budget=20_000, population=8)
-    extents = [1.0]
-    while not (min(extents) < 1e-8 and extents[-1] > 0.5):
-        extents.append(float(np.ptp(generation(optimizer))))
+    generation(optimizer)
+    extents = []
+    while len(members := optimizer.state.members):
+        extents.append(float(np.ptp(members)))
+        generation(optimizer)
         assert optimizer.evaluations < 5_000
+    assert extents[-1] < 0.01 * extents[0]
+    new = generation(optimizer)
+    assert sorted(np.floor(new[:, 0] * 8).tolist()) == list(range(8))
 
 
 def test_crossover_and_scale_are_learned_unless_they_are_not_to_be() -> None:

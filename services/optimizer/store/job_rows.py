@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
-from sqlalchemy import Connection, Select, Text, cast, insert, select, update
+from sqlalchemy import Connection, Select, Text, bindparam, cast, insert, select, update
 
 from gaitswarm.services.optimizer.errors import NotFound, Unreadable
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
@@ -27,7 +27,7 @@ from gaitswarm.sim.input import message_of
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
 """No vowels and no look-alikes, as ids are read aloud."""
 
-_ID: Final = re.compile(rf"[{ID_ALPHABET}]{{12}}")
+_FORM: Final = re.compile(rf"[{ID_ALPHABET}]{{12}}")
 
 _REMEDY: Final = (
     "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"
@@ -58,6 +58,13 @@ COLUMNS: Final = tuple(
 )
 """Columns of a row of a job; documents are text, so that a damaged one hides no other row."""
 
+# Statements of all columns, each built once: that takes longer than to execute them.
+_ROW: Final = select(*COLUMNS).where(jobs.c.id == bindparam("of"), EXISTING)
+_LOCKED_ROW: Final = _ROW.with_for_update()
+_ID: Final = select(jobs.c.id).where(jobs.c.id == bindparam("of"), EXISTING)
+_UPDATE: Final = update(jobs).where(jobs.c.id == bindparam("of")).returning(*COLUMNS)
+INSERT: Final = insert(jobs).returning(*COLUMNS)
+
 _LINEAGE: Final[TypeAdapter[Lineage | None]] = TypeAdapter(Lineage | None)
 
 
@@ -68,23 +75,22 @@ def new_job_id() -> str:
 
 def is_job_id(text: str) -> bool:
     """Return whether a text can be an id; databases refuse some other texts."""
-    return _ID.fullmatch(text) is not None
+    return _FORM.fullmatch(text) is not None
 
 
 def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
     """Return the row of a job, locked until the transaction's end. Raises NotFound."""
-    query = select(*COLUMNS)
-    return _row(connection, job_id, query.with_for_update() if lock else query)
+    return _row(connection, job_id, _LOCKED_ROW if lock else _ROW)
 
 
 def require_job(connection: Connection, job_id: str) -> None:
     """Raise NotFound for an unknown job."""
-    _row(connection, job_id, select(jobs.c.id))
+    _row(connection, job_id, _ID)
 
 
 def _row(connection: Connection, job_id: str, query: Select[Any]) -> Row:
     if is_job_id(job_id):
-        row = connection.execute(query.where(jobs.c.id == job_id, EXISTING)).mappings().first()
+        row = connection.execute(query, {"of": job_id}).mappings().first()
         if row is not None:
             return row
     raise NotFound(f"there is no job {job_id!r}")
@@ -92,8 +98,7 @@ def _row(connection: Connection, job_id: str, query: Select[Any]) -> Row:
 
 def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
     """Change a locked job and return its row; a job that ends leaves a notification."""
-    statement = update(jobs).where(jobs.c.id == row["id"]).values(**columns).returning(*COLUMNS)
-    after = connection.execute(statement).mappings().one()
+    after = connection.execute(_UPDATE, {"of": row["id"], **columns}).mappings().one()
     if after["notify_url"] is not None and "state" in columns and after["finished_at"] is not None:
         _add_notification(connection, after)
     return after

@@ -56,6 +56,7 @@ from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import take_history
 from gaitswarm.services.optimizer.store.job_rows import (
     COLUMNS,
+    INSERT,
     entering,
     is_job_id,
     job_row,
@@ -215,8 +216,7 @@ class Jobs(Aggregate):
             **_search_columns(job_id, spec.name, Labels()),
             **columns,
         }
-        statement = sa.insert(jobs).values(values).returning(*COLUMNS)
-        row: Row = connection.execute(statement).mappings().one()
+        row: Row = connection.execute(INSERT, values).mappings().one()
         note_change(connection, now, row["owner"] or LOCAL, action, job_id, **details)
         if fork is not None and fork.taken is not None:
             history = take_history(connection, row, fork.lineage, fork.taken, now)

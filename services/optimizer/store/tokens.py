@@ -132,7 +132,7 @@ def note_change(
 ) -> None:
     """Add an audit entry in the transaction of the change. The details are JSON without secrets."""
     entry = {"at": now, "actor": actor, "action": action, "job_id": job_id, "details": details}
-    connection.execute(insert(audit).values(entry))
+    connection.execute(insert(audit), entry)
 
 
 def check_quota(

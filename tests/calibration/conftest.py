@@ -52,6 +52,6 @@ def spec(**changes: object) -> CalibrationSpec:
         "targets": [{"walk": "stiff", "quantity": "speed", "value": 0.15, "tolerance": 0.1}],
         "variables": ["battery_voltage", "contact_law"],
         "optimizer": {"particles": 6},
-        "iterations": 3,
+        "iterations": 2,
     }
     return CalibrationSpec.model_validate(document | changes)

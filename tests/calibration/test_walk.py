@@ -24,6 +24,7 @@ def case(*variables: str, scenario: Scenario | None = None, **more: float) -> Ca
     return CalibrationWalk("w", ("szabadka2",), "pi", design, scenario or short_walk(), variables)
 
 
+@pytest.mark.variants("stick")
 @pytest.mark.parametrize("law", CONTACT_LAW.choices)
 def test_a_robot_walks_as_it_would_alone(law: Any) -> None:
     index = CONTACT_LAW.number(law)

@@ -75,7 +75,7 @@ def test_it_recovers_the_twins_battery_mass_and_efficiency(store: Store, twin: T
 
 @pytest.mark.slow
 def test_a_job_stopped_half_way_ends_with_the_same_bits(store: Store, twin: Twin) -> None:
-    brief = {"iterations": 4, "optimizer": PsoSettings(particles=5)}
+    brief = {"iterations": 2, "optimizer": PsoSettings(particles=5)}
     wanted = spec(store.add_recording(twin.recording), **brief)
     whole = finished(store, wanted)
     job, _ = JobService(store).submit(wanted)
@@ -83,7 +83,7 @@ def test_a_job_stopped_half_way_ends_with_the_same_bits(store: Store, twin: Twin
     evaluator = open_evaluator("in-process", cpus=1)
     try:
         run_embedded(store, evaluator, job.id, stop=stop, on_iteration=lambda _: stop.set())
-        assert store.job(job.id).progress.iterations < 4
+        assert store.job(job.id).progress.iterations < 2
         run_embedded(store, evaluator, job.id)
     finally:
         evaluator.close()
@@ -96,7 +96,7 @@ def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: Store, twin: 
     jobs = DatabaseJobs(JobService(store), "")
     brief = {
         "variables": ("battery_voltage", "damping_left_rear"),
-        "iterations": 6,
+        "iterations": 4,
         "optimizer": PsoSettings(particles=8),
     }
     ids = [

@@ -48,7 +48,7 @@ into_the_second_cycle = partial(cycles, 1.1)
 half_a_cycle = partial(cycles, 0.5)
 """Half of the feet have been lifted and set down: enough to see how they stand and slip."""
 
-QUICK = {"cycle_time": 0.5}
+QUICK = {"cycle_time": 0.35}
 """Fields of a scenario whose walk is one of few steps."""
 
 

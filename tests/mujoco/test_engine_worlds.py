@@ -24,7 +24,7 @@ from tests.examples.walks import UPHILL_WALK
 pytestmark = pytest.mark.slow
 
 PI = {"P": 0.45, "I": 0.1}
-STEP = Scenario(name="step", cycle_time=1.0, radius=0.16, hip_height=0.15, cycles=1)
+STEP = Scenario(name="step", cycle_time=0.7, radius=0.16, hip_height=0.15, cycles=1)
 MISHAPS: Mapping[str, Mapping[str, Any]] = {
     "backward": {"direction": "backward"},
     "a shove": {"shove": 3.0, "shove_direction": 90.0, "shove_at": 0.5},

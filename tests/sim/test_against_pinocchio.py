@@ -139,6 +139,7 @@ def test_every_link_is_where_pinocchio_has_it(
         same(found.rotation[k], np.array([place.rotation for place in places]))
 
 
+@pytest.mark.variants("szabadka2", "turned quadruped")
 def test_every_link_moves_as_in_pinocchio(
     oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
 ) -> None:
@@ -148,6 +149,7 @@ def test_every_link_moves_as_in_pinocchio(
         same(found.velocity[k], np.array(twists))
 
 
+@pytest.mark.variants("szabadka2", "turned quadruped")
 def test_energy_is_pinocchios_with_a_load_and_on_a_slope(
     oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
 ) -> None:
@@ -160,6 +162,7 @@ def test_energy_is_pinocchios_with_a_load_and_on_a_slope(
         same(found.potential[k], pin.computePotentialEnergy(links, data, oracle.q(q)))
 
 
+@pytest.mark.variants("szabadka2", "turned quadruped")
 def test_the_centre_of_mass_is_pinocchios(
     oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
 ) -> None:

@@ -111,14 +111,6 @@ def test_logged_currents_are_those_that_the_controller_reads(robot: Robot) -> No
     np.testing.assert_array_equal(unfiltered, np.abs(log.current))
 
 
-def test_kernels_agree_on_a_filtered_current(robot: Robot) -> None:
-    slow_sensor = filtered(robot, 0.01)
-    fast, slow = (
-        walk(BRIEF, robot=slow_sensor, backend=backend) for backend in ("native", "reference")
-    )
-    np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
-
-
 def test_kernels_agree_on_a_current_that_is_filtered_while_feet_come_down(robot: Robot) -> None:
     slow_sensor = filtered(robot, 0.01)
     kernel, (coding, timestep) = native_kernel(slow_sensor), control_steps(slow_sensor)

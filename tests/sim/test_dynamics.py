@@ -69,6 +69,7 @@ def test_accelerations_agree_with_pinocchio_in_random_states(
     assert worst < 1e-10
 
 
+@pytest.mark.variants("szabadka2")
 def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -> None:
     oracle = Oracle(robot)
     rng = np.random.default_rng(3)

@@ -291,6 +291,7 @@ QUICK: dict[str, Any] = {"cycle_time": 0.3, "cycles": 5, "height": 0.05, "fir_ms
 QUADRUPED_S: dict[str, Any] = {"hip_height": 0.16, "radius": 0.22, "stride": 0.04, "height": 0.03}
 
 
+@pytest.mark.variants("hexapod-wave", "quadruped-trot")
 @pytest.mark.parametrize(
     ("robot", "scenario"),
     [

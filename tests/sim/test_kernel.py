@@ -75,14 +75,6 @@ def test_kernels_take_the_same_short_steps_where_feet_come_down(robot: Robot) ->
     assert np.abs(coarse.sums / fast[0].sums - 1.0).max() > 1e-3
 
 
-def test_pi_controller_agrees_between_kernels() -> None:
-    results = [
-        simulate(SHORT, "pi", ["P", "I"], np.array([[0.25, 0.3]]), backend=backend).outcome
-        for backend in ("native", "reference")
-    ]
-    np.testing.assert_allclose(results[0].objectives, results[1].objectives, rtol=1e-9)
-
-
 def test_a_walk_has_the_same_bits_in_every_lane_batch_and_chunk() -> None:
     designs = swarm(2 * lanes() + 3)
     together = walk(designs)
@@ -306,13 +298,13 @@ def test_a_standing_robot_carries_its_weight(robot: Robot, kind: str) -> None:
     kernel = native_kernel(robot) if kind == "native" else reference_kernel(robot)
     assert kernel is not None
     setup = _setup(robot, kernel, SHORT)
-    still = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], 500, axis=0))
+    still = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], 300, axis=0))
     (result,) = kernel.walk([still], control_steps(robot)[0], log=True)
     assert result.states is not None
     log = walk_log(robot, still, result.states)
     carried = log.foot_force[:, :, 2].sum(axis=1)
     assert carried[0] == pytest.approx(66.3, abs=0.1)
-    assert carried[250:].mean() == pytest.approx(66.3, abs=0.1)
+    assert carried[150:].mean() == pytest.approx(66.3, abs=0.1)
     assert abs(log.base_velocity[-1, :3]).max() < 0.01
 
 

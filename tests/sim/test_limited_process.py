@@ -41,7 +41,7 @@ def hungry(*, seconds: float = 30.0, count: int = 1, kept: bool = True) -> Limit
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def processes() -> Iterator[LimitedProcesses]:
     opened = hungry()
     yield opened

@@ -30,6 +30,7 @@ from tests.examples.walks import (
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.variants("slope-fast", "turn-right-fast")
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_the_published_optimum_walks(scenario: Scenario) -> None:
     outcome = walk(scenario).outcome
@@ -44,6 +45,7 @@ def test_the_published_optimum_walks(scenario: Scenario) -> None:
     assert abs(height_loss) < 0.01
 
 
+@pytest.mark.variants("slope-fast", "turn-right-fast")
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_a_stiff_drive_walks_at_the_speed_that_the_gait_intends(scenario: Scenario) -> None:
     long = scenario.model_copy(update=LONG_STRIDES)

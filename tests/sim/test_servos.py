@@ -93,6 +93,7 @@ def test_friction_has_the_limit_of_bam(
 
 
 @pytest.mark.slow
+@pytest.mark.variants("mx64*sin_sin*", "erob*")
 @pytest.mark.parametrize(("actuator", "volts", "pendulum", "trajectory", "law", "angles"), SWINGS)
 def test_a_servo_moves_a_pendulum_as_in_bam(
     actuator: str,

@@ -35,6 +35,7 @@ def velocity(scenario: Scenario, tick: int) -> Floats:
     return np.asarray(steps[tick - 10 : tick].mean(axis=0))
 
 
+@pytest.mark.variants("-90.0", "30.0")
 @pytest.mark.parametrize("direction", [90.0, -90.0, 0.0, 180.0, 30.0])
 def test_a_shove_moves_the_body_by_impulse_over_mass(direction: float) -> None:
     still, shoved = (

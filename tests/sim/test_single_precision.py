@@ -82,6 +82,7 @@ def from_another_start(setup: WalkSetup, rng: np.random.Generator) -> WalkSetup:
 
 
 @pytest.mark.slow
+@pytest.mark.variants("szabadka2-reconstructed")
 @pytest.mark.parametrize(
     "choice", ["szabadka2", "szabadka2-reconstructed", RobotVariant(contact_law="stick")], ids=str
 )

@@ -163,11 +163,14 @@ def test_backlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
 
 
 def test_backlash_shakes_the_body() -> None:
-    shaken = simulate(SCENARIOS[0], "pi", ["P", "I"], PI, robot=LASH).outcome.objectives[0]
-    firm = simulate(SCENARIOS[0], "pi", ["P", "I"], PI, robot="szabadka2").outcome.objectives[0]
+    shaken, firm = (
+        simulate(BRIEF, "pi", ["P", "I"], PI, robot=robot).outcome.objectives[0]
+        for robot in (LASH, "szabadka2")
+    )
     assert shaken[2] > 1.5 * firm[2]
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("link", [1, 2, 3])
 def test_noise_on_a_link_costs_torque(link: int) -> None:
     calm_walk = SCENARIOS[0].model_copy(update={"cycles": 1.0})
@@ -201,9 +204,10 @@ def test_a_heavier_body_costs_energy() -> None:
     heavy = dataclasses.replace(
         robot, description=robot.description.model_copy(update={"body_mass": 5.0})
     )
-    costs = [simulate(BRIEF, "pi", ["P", "I"], PI, robot=r, log=True) for r in (heavy, robot)]
-    assert costs[0].outcome.objectives[0, 0] > costs[1].outcome.objectives[0, 0]
-    carried = costs[0].logs[0]
+    laden = simulate(BRIEF, "pi", ["P", "I"], PI, robot=heavy, log=True)
+    free = simulate(BRIEF, "pi", ["P", "I"], PI, robot=robot)
+    assert laden.outcome.objectives[0, 0] > free.outcome.objectives[0, 0]
+    (carried,) = laden.logs
     assert carried is not None
     assert carried.foot_force[0, :, 2].sum() == pytest.approx((6.76 + 1.75) * 9.81, rel=0.02)
 

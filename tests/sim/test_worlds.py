@@ -82,6 +82,7 @@ def test_the_nominal_world_is_the_model_to_the_bit(scenario: Scenario) -> None:
     assert bits(unnamed.run(np.empty((1, 0)))) == bits(walk(scenario).outcome)
 
 
+@pytest.mark.variants("backlash", "quadruped")
 @pytest.mark.parametrize("robot", VARIANTS.values(), ids=VARIANTS)
 def test_the_nominal_world_is_the_model_on_any_robot(robot: RobotSource) -> None:
     brief = short_walk(cycle_time=0.4, load=1.0, slope=5.0, slope_direction=70.0, drop=0.002)
@@ -301,13 +302,13 @@ def test_a_robot_begins_on_its_soles_however_it_is_tilted(robot: RobotSource) ->
 
 
 def test_angles_at_the_start_are_off_by_the_worlds_seed() -> None:
-    seeds = np.arange(60.0)
+    seeds = np.arange(40.0)
     names = ("world_seed", "start_angle")
-    worlds = np.stack([seeds, np.full(60, 0.02)], axis=1)
+    worlds = np.stack([seeds, np.full(40, 0.02)], axis=1)
     scenario = short_walk(cycle_time=0.2)
     logs = case(*names, scenario=scenario).simulate(worlds, log=True).logs
     begun = np.array([log.joint_angle[0] - log.desired_angle[0] for log in logs if log])
-    assert begun.shape == (60, 18)
+    assert begun.shape == (40, 18)
     assert begun.std() == pytest.approx(0.02, rel=0.06)
     assert abs(begun.mean()) < 0.002
     assert np.abs(np.corrcoef(begun.T) - np.eye(18)).max() < 0.55

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.assembly import control_steps, plan_walk
-from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.observation import sensed_currents, walk_log
@@ -18,7 +17,7 @@ from gaitswarm.sim.kernel.walk import Coding, current_smoothing
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.robot.robot import Robot
 from tests.examples.robots import changed
-from tests.examples.walks import PUBLISHED_A, short_walk, walk
+from tests.examples.walks import short_walk, walk
 
 BRIEF = short_walk(cycle_time=0.25)
 
@@ -137,19 +136,3 @@ def test_a_filter_changes_a_fuzzy_walk_and_none_that_ignores_currents(robot: Rob
         walk(BRIEF, stiff, "pi", robot=r).outcome.objectives for r in (slow_sensor, robot)
     )
     np.testing.assert_array_equal(ignoring, unfiltered)
-
-
-def test_walks_with_different_filters_are_computed_together_as_alone(robot: Robot) -> None:
-    kernel = native_kernel(robot)
-    assert kernel is not None
-    (coding, timestep), setups = control_steps(robot), []
-    for seconds in (0.0, 0.01, 0.002, 0.0, 0.03):
-        plan = plan_walk(filtered(robot, seconds), BRIEF, timestep)
-        assert plan is not None
-        setups.append(plan(CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)))
-    together = kernel.walk(setups, coding, log=False)
-    alone = [kernel.walk([setup], coding, log=False)[0] for setup in setups]
-    for a, b in zip(together, alone, strict=True):
-        np.testing.assert_array_equal(a.sums, b.sums)
-    assert len({tuple(result.end) for result in together}) == 4
-    assert together.lane_use.walked > sum(setup.ticks for setup in setups)

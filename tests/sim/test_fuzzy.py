@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.sim.compiler.compilation import Target, load_library, target
@@ -71,7 +71,6 @@ def scikit_fuzzy_union(e: float, c: float, w: tuple[float, ...], shape: Shape) -
     return np.max([np.minimum(level, output(peak)) for level, peak in fired], axis=0)
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.floats(-1, 1),
     st.floats(0, 1),

@@ -22,7 +22,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from gaitswarm.sim.robot.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
-from gaitswarm.sim.simulate import lanes, simulate
+from gaitswarm.sim.simulate import simulate
 from tests.examples import walks
 from tests.examples.walks import PUBLISHED_A
 
@@ -75,18 +75,6 @@ def test_kernels_take_the_same_short_steps_where_feet_come_down(robot: Robot) ->
     assert np.abs(coarse.sums / fast[0].sums - 1.0).max() > 1e-3
 
 
-def test_a_walk_has_the_same_bits_in_every_lane_batch_and_chunk() -> None:
-    designs = swarm(2 * lanes() + 3)
-    together = walk(designs)
-    assert np.isfinite(together).any()
-    alone = np.concatenate([walk(design[None]) for design in designs])
-    np.testing.assert_array_equal(together, alone)
-    np.testing.assert_array_equal(walk(designs[::-1])[::-1], together)
-    for size in (1, 3, lanes(), lanes() + 1):
-        chunks = [walk(designs[k : k + size]) for k in range(0, len(designs), size)]
-        np.testing.assert_array_equal(np.concatenate(chunks), together)
-
-
 def test_a_log_does_not_change_the_walk() -> None:
     designs = swarm(3)
     logged = simulate(SHORT, "fuzzy-pi", NAMES, designs, log=True)
@@ -103,21 +91,6 @@ def _setup(robot: Robot, kernel: Kernel, scenario: Scenario) -> WalkSetup:
 def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tuple[Status, bytes]]:
     results = kernel.walk(setups, control_steps(robot)[0], log=False)
     return [(result.status, result.sums.tobytes()) for result in results]
-
-
-def test_a_diverging_or_falling_walk_does_not_affect_its_neighbours(robot: Robot) -> None:
-    kernel = native_kernel(robot)
-    assert kernel is not None
-    good = _setup(robot, kernel, SHORT)
-    explosive = good.parameters.copy()
-    explosive[kernel.layout.slices["stiffness"]] = 1e12
-    bad = dataclasses.replace(good, parameters=explosive)
-    low = _falling(good, kernel)
-    ((status, expected),) = _sums(kernel, [good], robot)
-    assert status is Status.OK
-    mixed = _sums(kernel, [bad, good, low, good], robot)
-    assert [s for s, _ in mixed] == [Status.DIVERGED, Status.OK, Status.FELL, Status.OK]
-    assert mixed[1][1] == mixed[3][1] == expected
 
 
 def _falling(setup: WalkSetup, kernel: NativeKernel | ReferenceKernel) -> WalkSetup:
@@ -164,18 +137,6 @@ def test_a_walk_whose_internal_state_is_undefined_has_diverged(kind: str) -> Non
     results = kernel.walk([brief, lost], control_steps(machine)[0], log=True)
     assert [result.status for result in results] == [Status.OK, Status.DIVERGED]
     assert np.isfinite(results[1].end).all()
-
-
-def test_steps_of_a_lane_after_its_walk_do_not_count(robot: Robot) -> None:
-    kernel = native_kernel(robot)
-    assert kernel is not None
-    long = _setup(robot, kernel, SHORT)
-    falling = _falling(long, kernel)
-    brief = dataclasses.replace(falling, desired=falling.desired[:5])
-    alone = _sums(kernel, [brief], robot)
-    assert alone[0][0] is Status.OK
-    assert _sums(kernel, [falling], robot)[0][0] is Status.FELL
-    assert _sums(kernel, [brief, long], robot)[0] == alone[0]
 
 
 @pytest.mark.slow
@@ -281,16 +242,6 @@ def test_any_control_law_has_the_same_outputs_in_both_kernels(robot: Robot) -> N
     np.testing.assert_array_equal(compiled, readable)
     below_full_scale = np.abs(compiled) < coding.duty_per_count * coding.pwm_counts
     assert 0.1 < below_full_scale.mean() < 0.9
-
-
-def test_walks_of_different_length_share_a_group(robot: Robot) -> None:
-    kernel = native_kernel(robot)
-    assert kernel is not None
-    short = _setup(robot, kernel, SHORT)
-    long = _setup(robot, kernel, SHORT.model_copy(update={"cycles": 2.0}))
-    assert long.ticks == 2 * short.ticks
-    apart = [_sums(kernel, [s], robot)[0] for s in (short, long)]
-    assert _sums(kernel, [short, long], robot) == apart
 
 
 @pytest.mark.parametrize("kind", ["native", "reference"])

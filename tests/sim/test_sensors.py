@@ -160,6 +160,7 @@ def bits(result: WalkResult) -> bytes:
     return result.sums.tobytes() + result.end.tobytes()
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_imperfect_sensors_have_the_same_bits_in_any_lane_and_do_not_affect_neighbours(
     robot: Robot, precision: Precision

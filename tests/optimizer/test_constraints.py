@@ -197,7 +197,7 @@ def test_every_method_learns_to_keep_constraints_and_resumes(name: str) -> None:
         return np.stack([numbers, numbers], axis=1) if METHODS[name].multi_objective else numbers
 
     # A model of all designs before takes long: that of few already leads close to the best.
-    budget = 40 if name == "bayesian" else 200
+    budget = 40 if name == "bayesian" else 150
     search = create_search(settings, space, budget, 1, np.empty((0, 0)))
     best, resumed = math.inf, False
     with np.errstate(all="raise", under="ignore"):

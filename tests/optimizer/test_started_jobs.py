@@ -70,7 +70,7 @@ def test_the_best_of_a_start_is_never_lost(store: Store) -> None:
 
 
 def test_a_started_job_depends_on_no_other_job(store: Store) -> None:
-    earlier = run(store, spec(()))
+    earlier = run(store, spec((), iterations=2))
     job = run(store, spec({"jobs": [earlier.id], "count": 3}, seed=99))
     assert job.spec.start == tuple(best_designs(store, earlier, 3))
     alone = run(store, spec(job.spec.start, seed=99))
@@ -78,16 +78,19 @@ def test_a_started_job_depends_on_no_other_job(store: Store) -> None:
 
 
 def test_several_jobs_give_the_best_of_each_first(store: Store) -> None:
-    jobs = [run(store, spec((), seed=seed)) for seed in (1, 2)]
-    job = run(store, spec({"jobs": [job.id for job in jobs], "count": 3}))
+    jobs = [run(store, spec((), seed=seed, iterations=2)) for seed in (1, 2)]
+    wanted = spec({"jobs": [job.id for job in jobs], "count": 3})
+    job, _ = JobService(store).submit(wanted)
     firsts = [best_designs(store, job, 1)[0] for job in jobs]
     assert job.spec.start == (*firsts, best_designs(store, jobs[0], 2)[1])
 
 
 def test_a_variable_that_is_held_here_is_left_out_of_an_earlier_design(store: Store) -> None:
-    earlier = run(store, spec(()))
+    earlier = run(store, spec((), iterations=3))
     variables = [v for v in SPEC.design_space().variables if v.name == "P"]
-    job = run(store, spec({"jobs": [earlier.id]}, variables=variables, fixed={"I": 0.3}))
+    job = run(
+        store, spec({"jobs": [earlier.id]}, variables=variables, fixed={"I": 0.3}, iterations=2)
+    )
     assert [set(design) for design in job.spec.start] == [{"P"}] * 5
     assert evaluated(store, job)[0]["I"] == 0.3
 

@@ -27,10 +27,10 @@ from tests.examples.api_document import api_document
 from tests.examples.servers import Server
 
 _NAMED = {
-    "SimulationRequest": ("scenarios",),
+    "SimulationRequest": ("scenarios", "preference"),
     "RobustnessRequest": ("robot", "scenarios"),
     "ReplayRequest": ("robot", "scenario"),
-    "MeasuredWalkRequest": ("robot",),
+    "MeasuredWalkRequest": ("robot", "scenario"),
 }
 """Fields of bodies whose models are also part of another body."""
 
@@ -41,7 +41,7 @@ def _document() -> dict[str, Any]:
 
     Making all cases of specs takes minutes. All kinds are read alike: cases are made of those that
     tune a drive where jobs are submitted, and of all by `python -m tests.api.conformance`. Of
-    robots and scenarios, cases are made in one body each; others name them.
+    robots, scenarios and preferences, cases are made in one body each; others name them.
     """
     document = api_document()
     models = document["components"]["schemas"]

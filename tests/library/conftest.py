@@ -15,16 +15,17 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 
 import gaitswarm
+from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
 SMALL: dict[str, Any] = {
     "name": "small",
     "controller": "pi",
-    "scenarios": ["normal-fast", "6"],
+    "scenarios": [SHORT_WALK, UPHILL_WALK],
     "particles": 3,
     "iterations": 2,
     "seed": 7,
 }
-"""A job of a dozen walks, as keywords."""
+"""A job of a dozen short walks, as keywords."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,16 @@ def finished(finished_once: Finished, tmp_path: Path) -> Finished:
     db = tmp_path / "jobs.db"
     shutil.copy(finished_once.db, db)
     return Finished(db, finished_once.result)
+
+
+@pytest.fixture(scope="session")
+def many_jobs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with more jobs than there are on a page, which no test changes."""
+    db = tmp_path_factory.mktemp("many") / "jobs.db"
+    with gaitswarm.open(db) as here:
+        for seed in range(103):
+            here.submit(**{**SMALL, "name": str(seed)})
+    return db
 
 
 @pytest.fixture

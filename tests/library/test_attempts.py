@@ -171,17 +171,16 @@ def test_reading_gets_over_losses_and_gives_up_in_the_end(
 
 
 @pytest.mark.slow
-def test_a_list_is_asked_for_as_it_is_consumed(serve: Callable[[Path], str], db: Path) -> None:
-    with gaitswarm.open(db) as here:
-        for _ in range(101):
-            here.submit(**SMALL)
+def test_a_list_is_asked_for_as_it_is_consumed(
+    serve: Callable[[Path], str], many_jobs: Path
+) -> None:
     way = Flaky(losses=0)
-    with gaitswarm.ServerJobs(serve(db), transport=way) as jobs:
+    with gaitswarm.ServerJobs(serve(many_jobs), transport=way) as jobs:
         listed = jobs.jobs()
         assert len(way.sent) == 0
         next(listed)
         assert len(way.sent) == 1
-        assert len(list(listed)) == 100
+        assert len(list(listed)) == 102
         assert len(way.sent) == 2
 
 

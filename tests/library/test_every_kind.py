@@ -141,6 +141,9 @@ def test_evidence_and_stored_history_are_verified(jobs: DatabaseJobs, ended: Job
     assert stored.verified, stored
 
 
+@pytest.mark.variants(
+    "tuning", "tuning-over-worlds-of-two-scenarios", "tuning-over-worlds-for-a-front"
+)
 def test_every_analysis_answers_for_a_tuning(jobs: DatabaseJobs, tuned: JobView) -> None:
     best = jobs.best(tuned.id)
     assert jobs.ranking(tuned.id, "B").evaluations == tuned.evaluations

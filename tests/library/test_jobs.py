@@ -32,7 +32,7 @@ def test_a_job_is_submitted_by_keywords_and_then_found(reach: Reach, db: Path) -
     jobs = reach(db)
     job = jobs.submit(**SMALL)
     assert (job.state, job.name, job.controller) == ("queued", "small", "pi")
-    assert job.scenarios == ["normal-fast", "turn-right-fast"]
+    assert job.scenarios == ["short", "uphill"]
     assert (job.particles, job.iterations_planned, job.spec.seed) == (3, 2, 7)
     assert jobs.job(job.id) == job
     assert [found.id for found in jobs.jobs()] == [job.id]
@@ -93,7 +93,7 @@ def test_what_a_job_costs_is_estimated_and_not_stored(reach: Reach, db: Path) ->
     jobs = reach(db)
     estimate = jobs.estimate(**SMALL)
     assert (estimate.evaluations, estimate.walks) == (6, 12)
-    assert estimate.simulated_seconds == pytest.approx(12 * 4.5)
+    assert estimate.simulated_seconds == pytest.approx(6 * (1.0 + 1.5))
     assert list(jobs.jobs()) == []
 
 
@@ -106,16 +106,6 @@ def test_jobs_are_listed_by_state_search_and_order(reach: Reach, finished: Finis
     assert [job.id for job in jobs.jobs(search="SMALL")] == [finished.id]
     assert [job.id for job in jobs.jobs(limit=1)] == [new.id]
     assert list(jobs.jobs(limit=0)) == []
-
-
-@pytest.fixture(scope="module")
-def many_jobs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """More jobs than there are on a page."""
-    db = tmp_path_factory.mktemp("many") / "jobs.db"
-    with gaitswarm.open(db) as here:
-        for seed in range(103):
-            here.submit(**{**SMALL, "name": str(seed)})
-    return db
 
 
 def test_a_list_longer_than_a_page_is_whole(reach: Reach, many_jobs: Path) -> None:

@@ -20,9 +20,12 @@ from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import open_evaluator, open_store
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES
+from tests.examples.walks import SHORT_WALK
 from tests.library.conftest import SMALL, Finished
 
 pytestmark = pytest.mark.slow
+
+WALK: dict[str, Any] = {"controller": "pi", "scenarios": SHORT_WALK}
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +48,7 @@ def test_the_finished_job_comes_with_its_best_design_and_history(finished: Finis
     assert set(result.best.design) == {"P", "I"}
     assert [iteration.index for iteration in result.iterations] == [0, 1]
     assert result.iterations[-1].best_so_far == result.best.fitness
-    again = gaitswarm.simulate(result.best.design, controller="pi", scenarios=["1", "6"])
+    again = gaitswarm.simulate(result.best.design, controller="pi", scenarios=SMALL["scenarios"])
     assert again.fitness.tolist() == [result.best.fitness]
 
 
@@ -53,7 +56,7 @@ def test_every_evaluation_has_the_measurements_of_its_simulation(finished: Finis
     with gaitswarm.open(finished.db) as jobs:
         table = jobs.evaluations(finished.id)
     designs = [dict(zip(table.variables, row, strict=True)) for row in table.designs.tolist()]
-    again = gaitswarm.simulate(designs, controller="pi", scenarios=["1", "6"])
+    again = gaitswarm.simulate(designs, controller="pi", scenarios=SMALL["scenarios"])
     assert np.array_equal(table.measurements, again.measurements, equal_nan=True)
     best = finished.result.best.scenarios
     for k, scenario in enumerate(best.values()):
@@ -64,17 +67,16 @@ def test_every_evaluation_has_the_measurements_of_its_simulation(finished: Finis
 def test_a_job_runs_on_the_identified_robot(tmp_path: Path) -> None:
     robot = "szabadka2-identified"
     result = gaitswarm.optimize(
-        controller="pi",
-        scenarios="1",
+        **WALK,
         robot=robot,
         particles=2,
         iterations=1,
         db=tmp_path / "jobs.db",
     )
     assert result.job.spec.robot == robot
-    again = gaitswarm.simulate(result.best.design, controller="pi", scenarios="1", robot=robot)
+    again = gaitswarm.simulate(result.best.design, **WALK, robot=robot)
     assert again.fitness.tolist() == [result.best.fitness]
-    datasheet = gaitswarm.simulate(result.best.design, controller="pi", scenarios="1")
+    datasheet = gaitswarm.simulate(result.best.design, **WALK)
     assert datasheet.fitness.tolist() != [result.best.fitness]
 
 
@@ -108,7 +110,7 @@ def test_progress_is_reported_after_each_iteration_is_stored(db: Path) -> None:
 
 
 def test_without_a_place_the_job_is_in_the_users_own_database(user_data: Path) -> None:
-    result = gaitswarm.optimize(**{**SMALL, "iterations": 1, "scenarios": "1"})
+    result = gaitswarm.optimize(**{**SMALL, "iterations": 1})
     assert result.db == str(user_data / "gaitswarm" / "gaitswarm.db")
     with gaitswarm.open() as jobs:
         assert jobs.job(result.job.id) == result.job
@@ -246,7 +248,7 @@ def changed(db: Path) -> str:
         return job_provenance(spec).model_copy(update={"optimizer_digest": "0" * 32})
 
     with closing(open_store(str(db))) as store:
-        job, _ = JobService(store, provenance=elsewhere).submit(gaitswarm.JobSpec(iterations=1))
+        job, _ = JobService(store, provenance=elsewhere).submit(gaitswarm.job_spec(**SMALL))
     return job.id
 
 

@@ -122,10 +122,10 @@ def test_a_stop_is_heard_while_a_cluster_is_connected_that_never_answers(
 def test_an_optimization_fails_if_its_database_is_overwritten(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path
 ) -> None:
-    spec = write_json(SMALL_SPEC | {"iterations": 100})
+    spec = write_json(SMALL_SPEC | {"iterations": 40})
     assert gaitswarm("submit", "--spec", spec, "--db", db).code == 0
     process = ForkedCommand("optimize", "--spec", spec, "--db", db, "--evaluator", "in-process")
-    line_with(process.stderr, r"^\d+/100 iterations")
+    line_with(process.stderr, r"^\d+/40 iterations")
     db.write_bytes(os.urandom(db.stat().st_size))
     out, err = process.communicate(timeout=120)
     assert (process.returncode, out) == (5, "")

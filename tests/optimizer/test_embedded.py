@@ -24,8 +24,10 @@ from gaitswarm.services.optimizer.run.runner import EMBEDDED_LEASE_SECONDS, run_
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.outcome import Outcome
-from tests.optimizer.formula import SPEC, FormulaEvaluator
+from tests.optimizer.formula import SPEC as LONGER
+from tests.optimizer.formula import FormulaEvaluator
 
+SPEC = LONGER.model_copy(update={"iterations": 3})
 ALL = list(range(SPEC.iterations))
 
 

@@ -28,8 +28,10 @@ from gaitswarm.services.optimizer.run.coordinator import (
 from gaitswarm.services.optimizer.run.execution import OnCommit, RunContext, run_claim
 from gaitswarm.services.optimizer.store import Store
 from tests.examples.jobs import Bits, history
-from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
+from tests.optimizer.formula import HERE, FormulaEvaluator, job, walk
+from tests.optimizer.formula import SPEC as LONGER
 
+SPEC = LONGER.model_copy(update={"iterations": 4})
 BUDGET = SPEC.iterations
 
 

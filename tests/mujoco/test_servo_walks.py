@@ -26,7 +26,7 @@ FRICTION = {
 
 def test_a_walk_of_servos_is_worth_the_same_in_mujocos_own_steps() -> None:
     robot = changed(load_robot(servo_quadruped_files()), gearheads=FRICTION)
-    brief, design = short_walk(cycles=1.0, cycle_time=0.3), {"P": 32.0}
+    brief, design = short_walk(cycles=1.0, cycle_time=0.2), {"P": 32.0}
     ours = walk(brief, design, "servo", robot=robot).outcome.objectives[0]
     theirs, _ = walk_in_mujoco(robot, brief, "servo", design)
     np.testing.assert_allclose(theirs[:5], ours[:5], rtol=0.03)

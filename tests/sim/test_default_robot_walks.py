@@ -71,7 +71,7 @@ def velocities(log: WalkLog) -> tuple[Floats, Floats]:
 @pytest.mark.variants
 @pytest.mark.parametrize("turn", [0.5, 0.0, -0.5])
 def test_the_default_robot_drifts_to_its_right_which_is_no_distance(turn: float) -> None:
-    result = walk(TURN.model_copy(update={"turn": turn}), log=True)
+    result = walk(TURN.model_copy(update={"turn": turn, "cycles": 2.0}), log=True)
     (log,) = result.logs
     assert log is not None
     ahead, aside = velocities(log)

@@ -92,7 +92,7 @@ def test_a_walk_has_the_same_bits_in_a_lane_that_others_have_left(
     variant: RobotVariant, precision: Precision
 ) -> None:
     kernel, coding = kernel_and_coding(variant, precision)
-    setups = varied_walks(kernel, variant, 3 * kernel.lanes + 5)
+    setups = varied_walks(kernel, variant, 2 * kernel.lanes + 5)
 
     def walked(order: Sequence[int]) -> dict[int, tuple[Status, bytes]]:
         results = kernel.walk([setups[k] for k in order], coding, log=True)

@@ -125,13 +125,16 @@ def test_the_published_optimum_walks_slower_and_hotter_with_a_stuck_leg() -> Non
     assert stuck.measurements.motor_heat[0] > 2.0 * free.measurements.motor_heat[0]
 
 
-def with_a_stuck_leg(study: str, *, protected: bool = True, **options: Any) -> Simulation:
+def with_a_stuck_leg(
+    study: str, *, protected: bool = True, cycles: float = 3.0, **options: Any
+) -> Simulation:
     """A published optimum with its rules 5 and 6, or with the weight 0 in place of theirs."""
     controller, weight = RULES_5_AND_6[study]
     design = dict(CONTROLLERS[controller].published[study])
     if not protected:
         design[weight] = 0.0
-    simulated = walk(find_scenario("stuck-leg"), design, controller, **options)
+    stuck = find_scenario("stuck-leg").model_copy(update={"cycles": cycles})
+    simulated = walk(stuck, design, controller, **options)
     assert simulated.outcome.statuses.tolist() == [Status.OK]
     return simulated
 
@@ -173,7 +176,7 @@ def test_without_the_low_pass_of_the_current_the_protection_chatters(study: str)
     assert peak_and_heat(study, robot=unfiltered)[0] > 1.05
     reversals = {}
     for name, robot in (("filtered", load_robot(DEFAULT_ROBOT)), ("unfiltered", unfiltered)):
-        (log,) = with_a_stuck_leg(study, robot=robot, log=True).logs
+        (log,) = with_a_stuck_leg(study, cycles=2.0, robot=robot, log=True).logs
         assert log is not None
         current = log.current[:, robot.joint_names.index("right_middle_femur")]
         reversals[name] = np.count_nonzero(np.diff(np.sign(current)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,11 +11,11 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from gaitswarm.api.document import document
 from gaitswarm.api.page import is_built
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job
 from tests.api.conftest import Commit, Serve
+from tests.examples.api_document import api_document
 from tests.examples.servers import Server
 
 HTML = '<!doctype html><script type="module" src="/assets/index-A1b2.js"></script><p>Grüße</p>'
@@ -202,7 +201,6 @@ def test_long_json_is_compressed(page: httpx2.Client) -> None:
 
 
 def test_the_document_of_the_api_is_made_without_server_database_or_settings(
-    client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+    client: httpx2.Client,
 ) -> None:
-    monkeypatch.setenv("GAITSWARM_API_PORT", "none")
-    assert json.loads(document()) == client.get("/openapi.json").json()
+    assert api_document() == client.get("/openapi.json").json()

@@ -1,11 +1,16 @@
-"""The server's OpenAPI document, made once for all tests of a process: it takes seconds."""
+"""The OpenAPI document, made once for all tests of a process, as it takes seconds.
+
+It is made where a setting of the environment is wrong: no server, database or setting is needed.
+"""
 
 from __future__ import annotations
 
 import copy
 import json
+import os
 from functools import cache
 from typing import Any
+from unittest.mock import patch
 
 from gaitswarm.api.document import document
 
@@ -17,4 +22,5 @@ def api_document() -> dict[str, Any]:
 
 @cache
 def _document() -> dict[str, Any]:
-    return json.loads(document())
+    with patch.dict(os.environ, {"GAITSWARM_API_PORT": "none"}):
+        return dict(json.loads(document()))

@@ -50,7 +50,7 @@ def receiving() -> Iterator[Receiver]:
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
         receiver.host = f"127.0.0.1:{server.server_port}"
         receiver.url = f"http://{receiver.host}/hook?key=1"
-        thread = threading.Thread(target=server.serve_forever)
+        thread = threading.Thread(target=server.serve_forever, args=(0.02,))
         thread.start()
         try:
             yield receiver

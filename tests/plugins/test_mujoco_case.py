@@ -68,7 +68,7 @@ def test_it_keeps_to_the_contract_of_cases(mujoco_case: Path) -> None:
 def test_it_is_listed_with_its_distribution_and_the_schema_of_its_settings(
     mujoco_case: Path,
 ) -> None:
-    listed = said(process("plugins", "--json"))
+    listed = gaitswarm("plugins")
     (own,) = (one for one in listed if one["distribution"] != "gaitswarm-research")
     assert own == {
         "kind": "case",
@@ -78,7 +78,7 @@ def test_it_is_listed_with_its_distribution_and_the_schema_of_its_settings(
         "state": "ok",
         "reason": None,
     }
-    (case,) = said(process("cases", "--json"))
+    (case,) = gaitswarm("cases")
     assert case["settings_schema"]["properties"]["rate"]["default"] == 5000
 
 

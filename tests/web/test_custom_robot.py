@@ -18,7 +18,6 @@ from tests.examples.servers import Server, ServerProcess
 from tests.robots.test_obstacles import LIMITS, longer
 from tests.robots.test_proposal import dog
 from tests.web.pixels import painted
-from tests.web.test_job import open_advanced
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -135,10 +134,6 @@ def test_a_urdf_is_simulated_and_submitted(
     drop.fill("")
     expect(drop).to_be_visible()
 
-    open_advanced(page)
-    page.get_by_label("Particles").fill("2")
-    page.get_by_label("Iterations").fill("1")
-    expect(page.locator("[data-walks='4']")).to_be_visible()
     page.get_by_role("button", name="Submit the job").click()
     expect(page).to_have_url(re.compile(r"/jobs/(?!new)[^/?]+$"))
     spec = server.job(page.url.rsplit("/", 1)[1])["spec"]
@@ -146,6 +141,7 @@ def test_a_urdf_is_simulated_and_submitted(
     assert [scenario["name"] for scenario in spec["scenarios"]] == ["slow", "fast"]
 
 
+@pytest.mark.thorough("test_a_urdf_is_simulated_and_submitted, with surplus joints and servos")
 def test_a_robot_with_surplus_joints_and_named_servos_is_made_and_submitted(
     start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
@@ -169,9 +165,6 @@ def test_a_robot_with_surplus_joints_and_named_servos_is_made_and_submitted(
     expect(results).to_contain_text("dog: 4 legs, 12 joints, 14.50 kg")
     expect(results).to_contain_text("FL_toe_joint at 0.1 rad")
     expect(page.get_by_label("Text of robot.toml")).to_have_value(re.compile("Dynamixel MX-64"))
-    open_advanced(page)
-    page.get_by_label("Particles").fill("2")
-    page.get_by_label("Iterations").fill("1")
     page.get_by_role("button", name="Submit the job").click()
     expect(page).to_have_url(re.compile(r"/jobs/(?!new)[^/?]+$"))
     spec = server.job(page.url.rsplit("/", 1)[1])["spec"]

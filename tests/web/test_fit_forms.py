@@ -105,10 +105,7 @@ def test_a_log_is_uploaded_and_an_identification_submitted(
     mass.fill("light")
     expect(mass).to_have_attribute("aria-invalid", "true")
     mass.fill("3")
-    page.get_by_label("Particles").fill("4")
-    page.get_by_label("Iterations").fill("1")
     page.get_by_label("Links").fill("1, 2")
-    expect(page.locator("[data-walks='4']")).to_be_visible()
     spec = server.job(submitted(page))["spec"]
     assert (spec["kind"], spec["recordings"], spec["links"]) == (
         "identification",
@@ -135,10 +132,7 @@ def test_a_calibration_has_targets_of_a_log_and_typed_ones(
     page.get_by_label("value of target 3").fill("fast")
     expect(page.get_by_text("entry 3, value:")).to_be_visible()
     page.get_by_label("value of target 3").fill("0.15")
-    page.get_by_label("Particles").fill("4")
-    page.get_by_label("Iterations").fill("1")
     measured = float(value.input_value())
-    expect(page.locator("[data-walks='4']")).to_be_visible()
     spec = server.job(submitted(page))["spec"]
     assert spec["kind"] == "calibration"
     assert [(t["quantity"], t["tolerance"], t["use"]) for t in spec["targets"]] == [
@@ -151,6 +145,7 @@ def test_a_calibration_has_targets_of_a_log_and_typed_ones(
     assert spec["walks"][0]["scenarios"][0]["cycles"] == 1.0
 
 
+@pytest.mark.thorough("test_a_calibration_has_targets_of_a_log_and_typed_ones, of a table")
 def test_a_calibration_has_targets_of_a_table_without_a_log(
     start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
@@ -171,9 +166,6 @@ def test_a_calibration_has_targets_of_a_table_without_a_log(
     expect(typed).to_have_accessible_description(re.compile("is not: scenario, quantity, value"))
     typed.press_sequentially(", speed, 0.03")
     expect(page.get_by_label("value of target 4")).to_have_value("0.03")
-    page.get_by_label("Particles").fill("4")
-    page.get_by_label("Iterations").fill("1")
-    expect(page.locator("[data-walks]")).to_be_visible()
     spec = server.job(submitted(page))["spec"]
     assert [walk["scenarios"][0]["name"] for walk in spec["walks"]] == [
         *("normal-fast", "slope-fast", "normal-slow")

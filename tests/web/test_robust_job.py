@@ -55,6 +55,7 @@ def test_a_robust_job_is_configured_with_its_cost_in_view(
     expect(note).to_contain_text("The utility of a scenario is the worst over all worlds.")
 
 
+@pytest.mark.thorough("test_a_clone_has_the_same_spec, of a robust job")
 def test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
@@ -76,7 +77,7 @@ def test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec(
     assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
 
 
-@pytest.mark.thorough("test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec")
+@pytest.mark.thorough("test_a_robust_job_is_configured_with_its_cost_in_view")
 def test_other_jobs_are_not_described_as_robust(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -49,7 +49,7 @@ def calibration(server: ServerProcess) -> str:
     return job_id
 
 
-def test_the_list_shows_its_kind_and_its_page_the_applicable_tabs(
+def test_the_list_shows_its_kind_and_its_page_the_applicable_tabs_and_targets(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/jobs")
@@ -62,13 +62,7 @@ def test_the_list_shows_its_kind_and_its_page_the_applicable_tabs(
     best = server.job(calibration)["best"]["design"]["contact_law"]
     expect(page.get_by_role("definition").filter(has_text=best.replace("_", " "))).to_be_visible()
 
-
-def test_targets_show_deviation_and_use(
-    server: ServerProcess, calibration: str, visit: Callable[..., Visit]
-) -> None:
     targets = server.client.get(f"/v1/jobs/{calibration}/targets").json()["targets"]
-    page = visit(server.url).go(f"/jobs/{calibration}")
-
     rows = [page.locator(f'[data-target="stiff {name}"]') for name in ("speed", "energy")]
     for row, target, use in zip(rows, targets, ("fitted", "predicted"), strict=True):
         expect(row).to_contain_text(use)
@@ -98,7 +92,7 @@ def test_a_calibration_that_meets_no_target_does_not_look_succeeded(
     expect(page.get_by_text("succeeded", exact=True)).to_have_count(0)
 
 
-@pytest.mark.thorough("test_targets_show_deviation_and_use")
+@pytest.mark.thorough("test_the_list_shows_its_kind_and_its_page_the_applicable_tabs_and_targets")
 def test_choices_are_shown_by_name_everywhere(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:

@@ -36,16 +36,13 @@ def test_candidates_are_shown_against_the_reference_and_can_be_tuned_by(
 
 
 def test_a_search_is_submitted_from_the_job_that_it_tunes(
-    server: ServerProcess, visit: Callable[..., Visit]
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
-    tuning = DOCUMENT["tuning"]
-    tuned = server.submit(tuning)
-    server.wait_for(tuned, "succeeded")
-    page = visit(server.url).go(f"/jobs/{tuned}/robustness")
+    page = visit(server.url).go(f"/jobs/{finished_job}/robustness")
     page.get_by_role("button", name="Search for preferences").click()
-    expect(page.get_by_role("heading", name=f"preferences of {tuned}")).to_be_visible()
+    expect(page.get_by_role("heading", name="preferences of small")).to_be_visible()
     job_id = page.url.rpartition("/")[2]
     spec = server.client.get(f"/v1/jobs/{job_id}").json()["spec"]
-    best = server.client.get(f"/v1/jobs/{tuned}/best").json()["design"]
+    best = server.client.get(f"/v1/jobs/{finished_job}/best").json()["design"]
     assert (spec["kind"], spec["tuning"]["start"][0]) == ("preferences", best)
     server.client.post(f"/v1/jobs/{job_id}/cancel")

@@ -65,3 +65,7 @@ def test_a_job_without_a_feasible_design_says_what_stands_in_the_way_and_what_to
     expect(card).to_contain_text("no design met the constraints; closest is")
     expect(card).to_contain_text("instead of at least 0.5 m/s")
     expect(card).to_contain_text(f"gaitswarm fork {job_id} --from 1 --iterations 2 --constraint")
+    # There is no convergence to draw.
+    chart = page.get_by_role("region", name="Convergence")
+    expect(chart.get_by_role("heading", name="No design with a fitness yet")).to_be_visible()
+    expect(chart.locator(".uplot")).to_have_count(0)

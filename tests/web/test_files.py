@@ -31,11 +31,16 @@ def save(page: Page, chart: str, entry: str, folder: Path) -> Path:
     return target
 
 
-def opaque(canvas: Locator, x: float, y: float) -> bool:
-    """Whether something darker than a grid line is painted at a position [px]."""
-    read_pixel = "(c, [x, y]) => [...c.getContext('2d').getImageData(x, y, 1, 1).data]"
-    red, green, blue, alpha = canvas.evaluate(read_pixel, [x, y])
-    return bool(alpha > 200 and max(red, green, blue) < 160)
+READ_PIXELS = """(canvas, places) => {
+    const context = canvas.getContext('2d')
+    return places.map(([x, y]) => [...context.getImageData(x, y, 1, 1).data])
+}"""
+
+
+def opaque(canvas: Locator, places: list[tuple[float, float]]) -> list[bool]:
+    """Whether something darker than a grid line is painted at each position [px]."""
+    pixels = canvas.evaluate(READ_PIXELS, places)
+    return [alpha > 200 and max(colour) < 160 for *colour, alpha in pixels]
 
 
 def test_a_chart_is_exported_as_numbers_and_pictures(
@@ -72,11 +77,15 @@ def test_a_chart_is_exported_as_numbers_and_pictures(
     assert "▴ worse designs outside the range shown" in words
     # They are at the same positions as on the screen.
     canvas = page.locator(".uplot canvas").first
-    for left, foot, right, _, tip in marks:
-        assert opaque(canvas, (left + right) / 2, (2 * foot + tip) / 3)
+    assert all(
+        opaque(
+            canvas,
+            [((left + right) / 2, (2 * foot + tip) / 3) for left, foot, right, _, tip in marks],
+        )
+    )
     [dashed] = [line for line in drawing.iter(f"{SVG}path") if line.get("stroke-dasharray")]
     left, y, right, _ = map(float, re.findall(r"[-\d.]+", dashed.get("d", "")))
-    along = [opaque(canvas, left + (right - left) * step / 60, y) for step in range(1, 60)]
+    along = opaque(canvas, [(left + (right - left) * step / 60, y) for step in range(1, 60)])
     assert 20 < sum(along) < 60
     assert not list(drawing.iter(f"{SVG}image"))
 

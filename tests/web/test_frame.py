@@ -16,10 +16,19 @@ from tests.web.visit import Visit, show_tab_again
 pytestmark = pytest.mark.slow
 
 
-def test_the_skip_link_skips_the_header(
-    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+def test_titles_name_the_content_and_the_skip_link_leads_to_it(
+    server: ServerProcess,
+    finished_job: str,
+    start_server: Callable[..., Server],
+    visit: Callable[..., Visit],
 ) -> None:
-    page = visit(server.url).go("/jobs")
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    expect(page).to_have_title("small · succeeded · gaitswarm")
+    page.get_by_role("link", name="Jobs", exact=True).click()
+    expect(page).to_have_title("Jobs · gaitswarm")
+
+    # The skip link skips the header.
+    page.goto("/jobs")
     expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
     expect(page.locator(f"[data-job='{finished_job}']")).to_be_visible()
     page.keyboard.press("Tab")
@@ -30,23 +39,12 @@ def test_the_skip_link_skips_the_header(
     # The focus is in the content, not in the header.
     assert page.evaluate("document.querySelector('main').contains(document.activeElement)")
 
-
-def test_titles_name_the_job_and_its_progress(
-    server: ServerProcess,
-    finished_job: str,
-    start_server: Callable[..., Server],
-    visit: Callable[..., Visit],
-) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}")
-    expect(page).to_have_title("small · succeeded · gaitswarm")
-    page.get_by_role("link", name="Jobs", exact=True).click()
-    expect(page).to_have_title("Jobs · gaitswarm")
     waiting = start_server()
     page = visit(waiting.url).go(f"/jobs/{waiting.submit(SMALL_JOB)}")
     expect(page).to_have_title("small · queued 0/48 · gaitswarm")
 
 
-@pytest.mark.thorough("test_titles_name_the_job_and_its_progress")
+@pytest.mark.thorough("test_titles_name_the_content_and_the_skip_link_leads_to_it")
 def test_titles_and_breadcrumbs_name_the_content(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -86,7 +84,7 @@ def endless_job(server: ServerProcess) -> Iterator[str]:
     server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
-@pytest.mark.thorough("test_titles_name_the_job_and_its_progress")
+@pytest.mark.thorough("test_titles_name_the_content_and_the_skip_link_leads_to_it")
 def test_the_title_of_a_walk_shows_the_progress_of_its_job(
     server: ServerProcess, endless_job: str, visit: Callable[..., Visit]
 ) -> None:

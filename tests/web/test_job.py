@@ -283,17 +283,6 @@ def test_scenarios_are_compared_with_the_reference_of_the_job_by_speed(
         expect(change).to_contain_text("✓" if faster else "✗")
 
 
-def test_a_job_without_a_fitness_says_so_in_place_of_its_convergence(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
-    job_id = server.submit(SMALL_JOB | {"constraints": ["speed>=9"], "iterations": 1})
-    server.wait_for(job_id, "succeeded")
-    page = visit(server.url).go(f"/jobs/{job_id}")
-    card = page.get_by_role("region", name="Convergence")
-    expect(card.get_by_role("heading", name="No design with a fitness yet")).to_be_visible()
-    expect(card.locator(".uplot")).to_have_count(0)
-
-
 def test_former_addresses_lead_to_sections_and_activity_is_filtered_by_level(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -18,11 +18,7 @@ pytestmark = pytest.mark.slow
 def test_a_fork_and_its_parent_link_to_each_other(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}/summary")
-    expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
-    assert page.locator("[data-forks], [data-parent]").count() == 0
-
-    page.goto(f"{server.url}/jobs/{finished_job}/iterations/1")
+    page = visit(server.url).go(f"/jobs/{finished_job}/iterations/1")
     page.get_by_label("Other iterations").get_by_role("button", name="Fork…").click()
     dialog = page.get_by_role("dialog", name="Fork the job")
     # The default is the iteration after the one shown.
@@ -41,19 +37,20 @@ def test_a_fork_and_its_parent_link_to_each_other(
     fork_id = page.url.rpartition("/")[2]
     fork = server.wait_for(fork_id, "succeeded")
     assert fork["spec"]["scenario_weights"] == {"loaded": 2.0}
-    page.goto(f"{server.url}/jobs/{fork_id}/summary")
+    page.get_by_role("link", name="Details", exact=True).click()
     parent = page.locator(f"[data-parent='{finished_job}']")
     expect(parent).to_contain_text("with another optimizer")
     expect(parent).to_contain_text("another search method")
+    expect(page.locator("[data-forks]")).to_have_count(0)
     parent.get_by_role("link").click()
     expect(page).to_have_url(f"{server.url}/jobs/{finished_job}")
-    page.goto(f"{server.url}/jobs/{finished_job}/summary")
+    page.get_by_role("link", name="Details", exact=True).click()
     forks = page.locator("[data-forks='1']")
     expect(forks).to_contain_text("from iteration 2")
-    forks.get_by_role("link", name=fork_id).click()
-    expect(page).to_have_url(f"{server.url}/jobs/{fork_id}")
+    expect(page.locator("[data-parent]")).to_have_count(0)
+    expect(forks.get_by_role("link", name=fork_id)).to_have_attribute("href", f"/jobs/{fork_id}")
 
-    page.goto(f"{server.url}/jobs")
+    page.get_by_role("link", name="All jobs").click()
     row = page.get_by_role("row").filter(has_text="another way")
     expect(row).to_contain_text(f"fork of {finished_job}")
 

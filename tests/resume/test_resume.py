@@ -176,18 +176,18 @@ IN_WORLDS = {"count": 3, "ranges": ["world_seed"], "aggregate": "cvar"}
     [
         small(iterations=2, worlds=1, tuning=DOCUMENT["tuning"] | {"iterations": 1}),
         JobSpec.model_validate(
-            SPEC.model_dump() | {"scenarios": [ROUGH], "worlds": IN_WORLDS, "iterations": 2}
+            SPEC.model_dump() | {"scenarios": [ROUGH], "worlds": IN_WORLDS, "iterations": 4}
         ).with_gait_searched(),
     ],
     ids=["preferences", "rough ground"],
 )
-def test_a_job_stopped_after_its_first_iteration_equals_one_never_stopped(
+def test_a_job_stopped_in_its_midst_equals_one_never_stopped(
     store: Store, evaluator: Evaluator, spec: Spec
 ) -> None:
     whole, stopped = run_alone(store, evaluator, spec), queue(store, spec)
     stop = threading.Event()
     run_embedded(store, evaluator, stopped, stop=stop, on_iteration=lambda _: stop.set())
-    assert 1 == store.job(stopped).progress.iterations < store.job(whole).progress.iterations
+    assert 1 <= store.job(stopped).progress.iterations < store.job(whole).progress.iterations
     assert run_embedded(store, evaluator, stopped).state is JobState.SUCCEEDED
     assert walked(store, stopped) == walked(store, whole)
 

@@ -70,8 +70,9 @@ class LimitedProcesses:
         return answer
 
     def close(self) -> None:
-        for _ in range(self._idle.qsize()):
-            process = self._idle.get()
+        # Taken together, as a process that is put back is the next to be taken.
+        idle = [self._idle.get() for _ in range(self._idle.qsize())]
+        for process in idle:
             if process is not None:
                 _end(process)
             self._idle.put(None)

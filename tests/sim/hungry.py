@@ -13,7 +13,7 @@ from gaitswarm.sim.limited_process import Document, serve
 def answer(request: Document) -> Document:
     match request["do"]:
         case "wait":
-            time.sleep(60.0)
+            time.sleep(request.get("seconds", 60.0))
         case "compute":
             while True:
                 pass

@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,23 @@ def test_a_request_is_answered_during_a_long_one() -> None:
     assert waiting.is_alive()
     waiting.join()
     processes.close()
+
+
+def test_all_processes_end_when_they_are_closed() -> None:
+    processes = hungry(count=2)
+    together = threading.Barrier(2)
+
+    def ask(_: int) -> int:
+        together.wait()
+        return int(processes.ask({"do": "wait", "seconds": 0.3})["pid"])
+
+    with ThreadPoolExecutor(2) as threads:
+        first, second = threads.map(ask, range(2))
+    assert first != second
+    processes.close()
+    for pid in (first, second):
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
 
 
 def test_a_robot_is_checked_in_another_process_once(monkeypatch: pytest.MonkeyPatch) -> None:

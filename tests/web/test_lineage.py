@@ -37,6 +37,7 @@ def test_a_fork_and_its_parent_link_to_each_other(
     fork_id = page.url.rpartition("/")[2]
     fork = server.wait_for(fork_id, "succeeded")
     assert fork["spec"]["scenario_weights"] == {"loaded": 2.0}
+    assert fork["evaluations"] == 24
     page.get_by_role("link", name="Details", exact=True).click()
     parent = page.locator(f"[data-parent='{finished_job}']")
     expect(parent).to_contain_text("with another optimizer")

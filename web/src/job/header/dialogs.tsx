@@ -179,6 +179,8 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
       accept_changes: false,
       preference: changed(preference) as 'A' | null,
       optimizer: changed(method) as 'pso' | null,
+      // The budget is in iterations of this size.
+      particles: method === AS_PARENT ? null : job.particles,
       ...changesOf(measure, measureIn(job), job.scenarios),
     }
     const forked = post('/v1/jobs/{job_id}/fork', { path: { job_id: job.id }, body })

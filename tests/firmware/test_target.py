@@ -36,7 +36,7 @@ def test_both_processors_reproduce_the_simulator_in_time(copy_of_a: Path) -> Non
     ran = make(copy_of_a, "target")
     assert ran.code == 0, ran.out + ran.err
     totals = [entry for entry in ran.compared if entry[0] == "all"]
-    assert totals == 2 * [("all", 280_800, 0)]
+    assert totals == 2 * [("all", 81_000, 0)]
     counts = [tuple(map(int, found)) for found in COUNTED.findall(ran.out)]
     assert len(counts) == 2
     # Half the budget remains for converters, buses and interrupts.

@@ -167,7 +167,6 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
   // Iterations may be smaller than planned; their mean size is exact for all of them.
   const copied = startValid ? Math.round((job.evaluations * start) / job.iterations) : 0
   const budget = useBudget(job, copied)
-  const valid = startValid && budget.valid
   const last = formatCount(job.iterations)
   const changed = (value: string) => (value === AS_PARENT ? null : value)
   const fork = () => {
@@ -179,7 +178,6 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
       accept_changes: false,
       preference: changed(preference) as 'A' | null,
       optimizer: changed(method) as 'pso' | null,
-      // The budget is in iterations of this size.
       particles: method === AS_PARENT ? null : job.particles,
       ...changesOf(measure, measureIn(job), job.scenarios),
     }
@@ -189,7 +187,7 @@ export function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: ()
   return (
     <ConfirmDialog
       title="Fork the job"
-      disabled={!valid || busy}
+      disabled={!startValid || !budget.valid || busy}
       onConfirm={fork}
       onDismiss={onDismiss}
     >

@@ -19,6 +19,7 @@ from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
 from gaitswarm.sim.gait.curves import foot_curve
 from gaitswarm.sim.gait.gaits import LegGait, Sway, leg_gaits
 from gaitswarm.sim.gait.inverse_kinematics import chain_angles, leg_angles
+from gaitswarm.sim.memory import require_room_for_scipy
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 from gaitswarm.sim.robot.robot import Robot
@@ -42,11 +43,11 @@ def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
     # One or two symmetric coefficients are equal, and have no cut-off below Nyquist's.
     if window == "moving_average" or taps < 3:
         return np.full(taps, 1.0 / taps)
-    # As by scipy.signal.firwin, whose import takes a second.
-    cutoff, from_middle = 2.0 / taps, np.arange(taps) - 0.5 * (taps - 1)
-    gains = cutoff * np.sinc(cutoff * from_middle)
-    gains *= 0.54 + (1.0 - 0.54) * np.cos(np.linspace(-np.pi, np.pi, taps))
-    return np.asarray(gains / gains.sum())
+    # Slow to import, and needed only for this window.
+    require_room_for_scipy()
+    from scipy.signal import firwin  # noqa: PLC0415
+
+    return np.asarray(firwin(taps, 2.0 / taps, window="hamming"))
 
 
 def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") -> Floats:

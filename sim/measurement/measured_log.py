@@ -303,12 +303,9 @@ def _cross_correlation(x: Floats, y: Floats) -> Floats:
     """sum over rows and columns of x[t + k] y[t], for k from -(len(y) - 1) to len(x) - 1."""
     # Slow to import, and not needed to show recordings.
     require_room_for_scipy()
-    from scipy import fft  # noqa: PLC0415
+    from scipy.signal import fftconvolve  # noqa: PLC0415
 
-    length = len(x) + len(y) - 1
-    padded = fft.next_fast_len(length, real=True)
-    spectrum = fft.rfft(x, padded, axis=0) * fft.rfft(y[::-1], padded, axis=0)
-    product: Floats = fft.irfft(spectrum, padded, axis=0)[:length].sum(axis=1)
+    product: Floats = fftconvolve(x, y[::-1], axes=0).sum(axis=1)
     return product
 
 

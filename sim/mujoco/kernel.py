@@ -272,14 +272,9 @@ class _Terrain:
             if fall < 0.0:  # beyond the field
                 heights[foot], along, across = self._grid.under(place[0], place[1])
                 normal = np.array([-along, -across, 1.0])
-            x, y, z = (normal / math.sqrt(normal @ normal)).tolist()
-            ahead_x, ahead_z = z / math.hypot(x, z), -x / math.hypot(x, z)
-            # The second row is the cross product of the third and the first.
-            axes[foot] = (
-                (ahead_x, 0.0, ahead_z),
-                (y * ahead_z, z * ahead_x - x * ahead_z, -y * ahead_x),
-                (x, y, z),
-            )
+            normal /= math.sqrt(normal @ normal)
+            ahead = np.array([normal[2], 0.0, -normal[0]]) / math.hypot(normal[0], normal[2])
+            axes[foot] = ahead, np.cross(normal, ahead), normal
         return heights, axes
 
     def lay_planes(self, places: Floats) -> None:

@@ -19,16 +19,15 @@ import os, resource
 import numpy as np
 from gaitswarm.services.optimizer.run.outage import is_infrastructure
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.sim.memory import rotations
+from gaitswarm.sim.gait.trajectory import fir_gains
 
 def limit(mebibytes):
     size = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (size + (mebibytes << 20), hard))
 
-RandomNumbers(1, 0).uniform(3)
 for mebibytes in (8, 32, 48, 64, 96, 128):
-    for load in (lambda: RandomNumbers(1, 0).normal(3), rotations):
+    for load in (lambda: RandomNumbers(1, 0).normal(3), lambda: fir_gains(100, "hamming")):
         limit(mebibytes)
         try:
             load()

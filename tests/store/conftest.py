@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,15 +17,8 @@ from tests.store.postgres_server import PostgresServer, postgres_server, server_
 
 _DATABASES = ["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)]
 
-_ON_POSTGRESQL = {
-    "test_bits": "",
-    "test_claims": "oldest|created_claimed_belongs|ran_out|stale|clock_ahead|in_order|quarantined",
-    "test_job_list": "reads_back|same_key|searched|sorted|pages|any_method|every_order",
-}
-"""Tests that `make test` runs on PostgreSQL too, by module, all whose names have a match.
-
-They are of bits, locks, texts and their order, where databases differ; `make test-all` runs all.
-"""
+_ON_POSTGRESQL = {"test_bits", "test_claims", "test_job_list"}
+"""Modules that `make test` runs on PostgreSQL too; `make test-all` runs all of them."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -34,8 +26,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Leave most tests on PostgreSQL to `make test-all`."""
     here = Path(__file__).parent
     for item in items:
-        pattern = _ON_POSTGRESQL.get(item.path.stem)
-        if item.path.parent != here or (pattern is not None and re.search(pattern, item.name)):
+        if item.path.parent != here or item.path.stem in _ON_POSTGRESQL:
             continue
         parameters = getattr(item, "callspec", None)
         if parameters is not None and "postgresql" in parameters.params.values():

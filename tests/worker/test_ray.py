@@ -18,7 +18,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, KilledWorker
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
@@ -57,24 +57,6 @@ def test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits(
     assert capfd.readouterr().out == ""
 
 
-@pytest.mark.slow
-def test_walks_that_crash_worker_after_worker_are_named(
-    ray_evaluator: RayEvaluator, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import ray
-
-    gone = Mock(side_effect=ray.exceptions.WorkerCrashedError)
-    ray_evaluator.wait_until_open(never)
-    with monkeypatch.context() as patched:
-        patched.setattr(ray, "get", gone)
-        with pytest.raises(KilledWorker, match="3 worker processes died"):
-            ray_evaluator.evaluate(request(1), never)
-
-
-@pytest.mark.thorough(
-    "test_walks_that_crash_worker_after_worker_are_named",
-    "test_walks_that_kill_worker_after_worker_fail_their_job_with_the_reason",
-)
 @pytest.mark.slow
 def test_a_job_whose_simulation_crashes_its_process_fails_and_its_runner_continues(
     ray_evaluator: RayEvaluator, store: Store, tmp_path: Path
